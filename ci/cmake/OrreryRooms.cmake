@@ -1,0 +1,63 @@
+# Rooms: a folder with its headers beside its sources. Everyone includes <orrery/...>, in the tree
+# through links in the build folder and installed as plain files.
+set(ORRERY_INCLUDE_ROOT ${PROJECT_BINARY_DIR}/include)
+file(MAKE_DIRECTORY ${ORRERY_INCLUDE_ROOT}/orrery)
+foreach(wing IN ITEMS harness models fixtures)
+  file(CREATE_LINK ${PROJECT_SOURCE_DIR}/${wing} ${ORRERY_INCLUDE_ROOT}/orrery/${wing} SYMBOLIC)
+endforeach()
+file(CREATE_LINK ${PROJECT_SOURCE_DIR}/fixtures/orrery.hpp ${ORRERY_INCLUDE_ROOT}/orrery/orrery.hpp
+  SYMBOLIC)
+
+# orrery_library(name): the library orrery_<name> with the alias orrery::<name>.
+function(orrery_library name)
+  add_library(orrery_${name} STATIC)
+  add_library(orrery::${name} ALIAS orrery_${name})
+  set_target_properties(orrery_${name} PROPERTIES EXPORT_NAME ${name} VERIFY_INTERFACE_HEADER_SETS ON)
+  target_compile_features(orrery_${name} PUBLIC cxx_std_20)
+  # Linked in the build tree only: neither flags nor warnings reach a consumer.
+  target_link_libraries(orrery_${name} PRIVATE
+    $<BUILD_INTERFACE:orrery_numerics> $<BUILD_INTERFACE:orrery_warnings>)
+  set_property(GLOBAL APPEND PROPERTY ORRERY_INSTALLED_TARGETS orrery_${name})
+endfunction()
+
+# orrery_room(library ROOM wing/room HEADERS ... SOURCES ...): adds a room to a library. Headers are
+# public; paths are relative to the room.
+function(orrery_room library)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "ROOM" "HEADERS;SOURCES")
+  list(TRANSFORM arg_HEADERS PREPEND ${ORRERY_INCLUDE_ROOT}/orrery/${arg_ROOM}/)
+  list(TRANSFORM arg_SOURCES PREPEND ${PROJECT_SOURCE_DIR}/${arg_ROOM}/)
+  target_sources(orrery_${library}
+    PUBLIC FILE_SET HEADERS BASE_DIRS ${ORRERY_INCLUDE_ROOT} FILES ${arg_HEADERS}
+    PRIVATE ${arg_SOURCES})
+endfunction()
+
+# orrery_suite(name SOURCES ... LINK ... LABELS ...): a GoogleTest program of the project itself that
+# needs no flight library. Programs that fly something use orrery_add_test.
+function(orrery_suite name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "SOURCES;LINK;LABELS")
+  add_executable(${name} ${arg_SOURCES})
+  target_link_libraries(${name} PRIVATE ${arg_LINK} GTest::gmock GTest::gtest_main
+    orrery_numerics orrery_warnings)
+  if(NOT arg_TIMEOUT)
+    set(arg_TIMEOUT 120)
+  endif()
+  target_compile_definitions(${name} PRIVATE ORRERY_REFERENCE_DATA="${ORRERY_REFERENCE_DATA}")
+  include(GoogleTest)
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
+    PROPERTIES LABELS "${arg_LABELS}" TIMEOUT ${arg_TIMEOUT})
+endfunction()
+
+# orrery_bench(name SOURCES ... LINK ...): a Google Benchmark program. ctest runs each briefly, so that
+# none rots; no time is asserted.
+function(orrery_bench name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;LINK")
+  if(NOT ORRERY_BENCHMARKS)
+    return()
+  endif()
+  find_package(benchmark REQUIRED)
+  add_executable(${name} ${arg_SOURCES})
+  target_link_libraries(${name} PRIVATE ${arg_LINK} benchmark::benchmark_main
+    orrery_numerics orrery_warnings)
+  add_test(NAME ${name} COMMAND ${name} --benchmark_min_time=0.01)
+  set_tests_properties(${name} PROPERTIES LABELS bench TIMEOUT 300)
+endfunction()

@@ -1,0 +1,14 @@
+/// Raw bytes, as they cross from devices to flight software and between spacecraft.
+#pragma once
+
+#include <cstddef>
+#include <orrery/harness/kernel/simulator_only.hpp>
+#include <span>
+#include <vector>
+
+namespace orrery {
+
+using Bytes = std::span<const std::byte>;
+using ByteBuffer = std::vector<std::byte>;
+
+}  // namespace orrery

@@ -1,0 +1,77 @@
+/// The event loop: owners, a queue, the current instant, the fingerprint.
+#pragma once
+
+#include <orrery/harness/kernel/bytes.hpp>
+#include <orrery/harness/kernel/event.hpp>
+#include <orrery/harness/kernel/event_queue.hpp>
+#include <orrery/harness/kernel/fingerprint.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace orrery {
+
+/// Where an event belongs. `kind` must outlive the loop (a namespace-scope constant).
+struct EventSpec {
+  Phase phase = Phase::kDevice;
+  OwnerId destination = 0;
+  OwnerId origin = 0;
+  const EventKind* kind = nullptr;
+};
+
+/// Runs events in the order of their keys.
+///
+/// Fingerprint  Each event except those of Phase::kRecorder is mixed into the chain of its
+///              destination when it is executed; payload bytes are added by the action itself, with
+///              fingerprint_payload().
+/// Errors       Scheduling before now() throws std::invalid_argument with both times.
+class EventLoop {
+ public:
+  explicit EventLoop(SimTime start);
+
+  /// Ids are 0, 1, 2 ... in order of the calls. @throws std::length_error  after 65535.
+  OwnerId add_owner(std::string name);
+  const std::string& owner_name(OwnerId id) const;
+  std::size_t owner_count() const;
+
+  SimTime now() const { return now_; }
+
+  /// @throws std::invalid_argument  `t` before now(), an unknown owner, or a null kind.
+  EventHandle schedule(SimTime t, const EventSpec& spec, Action action);
+  /// True if the event was pending; false if it has run, was cancelled or never was.
+  bool cancel(EventHandle handle);
+
+  /// Executes all events with time <= t, in order, then sets now() to t.
+  /// @throws std::invalid_argument  t before now().
+  void run_until(SimTime t);
+  /// Executes the next event if its time is <= t. False if there is none (now() is unchanged then).
+  bool run_next(SimTime t);
+  /// Sets now() to t. @throws std::logic_error  an event before or at t is pending; t before now().
+  void advance_to(SimTime t);
+
+  /// Within an action: adds these bytes, and their length, to the fingerprint of the running event.
+  void fingerprint_payload(Bytes payload);
+
+  const Fingerprint& fingerprint() const { return fingerprint_; }
+  /// From here on, keep every executed event, so that two runs can be compared event by event.
+  void keep_log(bool keep);
+  const std::vector<EventRecord>& log() const { return log_; }
+  std::uint64_t events_executed() const { return executed_; }
+  std::size_t events_pending() const { return queue_.size(); }
+  /// Kind of the running event, for crash reports; null between events.
+  const EventKind* current_kind() const { return current_kind_; }
+
+ private:
+  EventQueue queue_;
+  Fingerprint fingerprint_;
+  std::vector<std::string> owners_;
+  std::vector<std::uint64_t> counters_;
+  std::vector<EventRecord> log_;
+  SimTime now_;
+  const EventKind* current_kind_ = nullptr;
+  OwnerId current_owner_ = 0;
+  std::uint64_t executed_ = 0;
+  bool keep_log_ = false;
+};
+
+}  // namespace orrery

@@ -1,0 +1,43 @@
+/// Rolling hash of executed events, one chain per owner.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <orrery/harness/kernel/bytes.hpp>
+#include <orrery/harness/kernel/event.hpp>
+#include <string>
+#include <vector>
+
+namespace orrery {
+
+/// One executed event, as kept for comparing two runs.
+struct EventRecord {
+  EventKey key;
+  const EventKind* kind = nullptr;
+  std::uint64_t chain = 0;  // the destination's chain after this event, payload included
+};
+
+class Fingerprint {
+ public:
+  void add_owner();
+  /// Mixes (t, phase, kind id, origin, counter) into the chain of key.destination.
+  void event(const EventKey& key, std::uint16_t kind_id);
+  /// Mixes the length and the bytes.
+  void payload(OwnerId owner, Bytes bytes);
+  std::uint64_t chain(OwnerId owner) const { return chains_[owner]; }
+  /// The run's value: a hash over the chains in owner order, 16 hex digits.
+  std::string value() const;
+
+ private:
+  std::vector<std::uint64_t> chains_;
+};
+
+/// The first place at which two logs differ.
+struct EventDifference {
+  std::size_t index = 0;            // in both logs
+  std::optional<EventRecord> a, b;  // empty: that log ended here
+};
+std::optional<EventDifference> first_difference(const std::vector<EventRecord>& a,
+                                                const std::vector<EventRecord>& b);
+
+}  // namespace orrery

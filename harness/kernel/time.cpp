@@ -1,0 +1,3 @@
+#include <orrery/harness/kernel/time.hpp>
+
+namespace orrery {}

@@ -1,0 +1,1 @@
+#include <orrery/models/device/device.hpp>

@@ -1,0 +1,75 @@
+/// Sensors, actuators and radios. Derive from Device to add one; the ready ones do the same.
+#pragma once
+
+#include <orrery/harness/kernel/bytes.hpp>
+#include <orrery/harness/kernel/event.hpp>
+#include <orrery/harness/kernel/random.hpp>
+#include <orrery/harness/kernel/time.hpp>
+#include <orrery/models/frames/vector.hpp>
+#include <orrery/models/orbit/force_model.hpp>
+#include <string_view>
+
+namespace orrery {
+
+/// What a device may see and do. One per device; it lives as long as the world.
+class DeviceContext {
+ public:
+  virtual ~DeviceContext() = default;
+
+  virtual std::string_view spacecraft() const = 0;
+  /// Truth time.
+  virtual SimTime now() const = 0;
+  /// What the spacecraft's own clock shows [ns since the GPS epoch], and the truth time at which it
+  /// will show a given value.
+  virtual std::int64_t onboard_ns() const = 0;
+  virtual SimTime truth_of_onboard(std::int64_t onboard_ns) const = 0;
+  /// The spacecraft's state now. Looking changes nothing.
+  virtual OrbitState truth() const = 0;
+  virtual Surroundings surroundings() const = 0;
+  /// Attitude now: f_B = R_BI * f_ECI.
+  virtual Mat3 R_BI() const = 0;
+  /// The device's own stream (seed, spacecraft, device, purpose). Keep the reference if you like.
+  virtual RandomStream& random(std::string_view purpose) = 0;
+
+  /// Runs `action` once, `delay` from now. @throws std::invalid_argument  negative delay.
+  virtual EventHandle after(Duration delay, Action action) = 0;
+  /// Runs `action` now, then every `period`, until cancelled or the device loses power.
+  /// @throws std::invalid_argument  period <= 0.
+  virtual EventHandle every(Duration period, Action action) = 0;
+  virtual bool cancel(EventHandle handle) = 0;
+
+  /// Hands bytes to the flight port to which this device is connected (dropped where there is
+  /// none).
+  virtual void to_flight(Bytes bytes) = 0;
+  /// Sends a frame over the link to another spacecraft; its device of the same name gets it.
+  virtual void transmit(std::string_view to, Bytes frame) = 0;
+
+  /// Changes this spacecraft's velocity by dv_ECI [m/s] at this instant. @throws std::domain_error
+  /// not finite.
+  virtual void apply_impulse(const Vec3& dv_ECI) = 0;
+
+  /// Adds a sample to the channel "<spacecraft>/<device>/<channel>".
+  virtual void record(std::string_view channel, double value) = 0;
+  /// A message in the run's log: LEVEL is 0 debug, 1 info, 2 warning, 3 error.
+  virtual void log(int level, std::string_view line) = 0;
+  /// Value of a named fault parameter of this device; `nominal` while no fault is active.
+  virtual double fault(std::string_view name, double nominal) const = 0;
+};
+
+/// Part of a spacecraft.
+class Device {
+ public:
+  virtual ~Device() = default;
+  /// Unique on its spacecraft; by default also the flight port it is wired to.
+  virtual std::string_view name() const = 0;
+  /// At each power-on.
+  virtual void start(DeviceContext& io) = 0;
+  /// Bytes that flight software wrote to the connected port.
+  virtual void from_flight(DeviceContext& io, Bytes bytes) { (void)io, (void)bytes; }
+  /// A frame from another spacecraft's device of the same name.
+  virtual void from_air(DeviceContext& io, std::string_view sender, Bytes frame) {
+    (void)io, (void)sender, (void)frame;
+  }
+};
+
+}  // namespace orrery

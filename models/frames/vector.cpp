@@ -1,0 +1,1 @@
+#include <orrery/models/frames/vector.hpp>
