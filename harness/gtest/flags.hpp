@@ -1,0 +1,54 @@
+/// Flags of every test program. Each --orrery_x is also the environment variable ORRERY_X; the flag
+/// wins.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <orrery/harness/kernel/simulator_only.hpp>
+#include <orrery/harness/kernel/time.hpp>
+#include <string>
+#include <vector>
+
+namespace orrery {
+
+/// What --orrery_record asks for.
+struct RecordSetting {
+  enum class Mode { kOff, kEvents, kPeriodic };
+  Mode mode = Mode::kPeriodic;
+  std::optional<Duration> period = {};  // empty: 1 s in runs up to 24 h, then 10 s
+};
+
+/// Levels are those of the flight ABI: 0 debug, 1 info, 2 warning, 3 error; 4 prints nothing.
+struct LogSetting {
+  int level = 4;
+  std::string spacecraft = {};  // empty: all
+};
+
+struct Flags {
+  std::uint64_t seed = 1;                 // --orrery_seed=N, below 2^53
+  std::optional<int> runs = {};           // --orrery_runs=N: n of every Seeds()
+  std::string out = {};                   // --orrery_out=DIR; empty: write nothing
+  std::optional<Duration> break_at = {};  // --orrery_break_at=SECONDS since the world's start
+  RecordSetting record = {};              // --orrery_record=off|events|PERIOD (1s, 500ms, 10)
+  LogSetting log = {};                    // --orrery_log=LEVEL[,SPACECRAFT]
+  bool progress = false;                  // --orrery_progress: progress and a result table
+};
+
+/// Reads and removes the --orrery_* flags. Call it before testing::InitGoogleTest, which evaluates
+/// Seeds(n). A flag that is unknown, malformed or not available ends the program with exit code 2
+/// and one line that says so.
+void Init(int* argc, char** argv);
+
+/// As read by Init, else by the environment alone.
+const Flags& flags();
+/// False until Init has run.
+bool initialised();
+/// How this program was started, for replay commands.
+const std::string& program_name();
+
+/// Parses arguments (without the program's name) over an environment ("ORRERY_SEED=3").
+/// @throws std::invalid_argument  with the text that Init prints.
+Flags parse_flags(const std::vector<std::string>& arguments,
+                  const std::vector<std::string>& environment);
+
+}  // namespace orrery

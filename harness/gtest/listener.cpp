@@ -1,0 +1,54 @@
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <orrery/harness/gtest/listener.hpp>
+#include <orrery/harness/gtest/run_context.hpp>
+#include <string>
+
+namespace orrery {
+namespace {
+
+class Listener : public testing::EmptyTestEventListener {
+  void OnTestStart(const testing::TestInfo&) override { explained_ = false; }
+
+  void OnTestPartResult(const testing::TestPartResult& result) override {
+    if (!result.failed() || explained_) return;
+    const std::string runs = describe_live_runs();
+    if (runs.empty()) return;
+    explained_ = true;
+    std::printf("[ orrery   ] where this run stands:\n%s", runs.c_str());
+    std::printf("  replay: %s\n", replay_command().c_str());
+    std::fflush(stdout);
+  }
+
+  bool explained_ = false;  // once per test: the first failure is the one to look at
+};
+
+bool is_unfiltered_shard() {
+  const char* shards = std::getenv("GTEST_TOTAL_SHARDS");
+  return shards != nullptr && testing::GTEST_FLAG(filter) == "*";
+}
+
+}  // namespace
+
+void install_listener() {
+  static const bool installed = [] {
+    testing::UnitTest::GetInstance()->listeners().Append(new Listener);  // GoogleTest owns it
+    return true;
+  }();
+  (void)installed;
+}
+
+int run_all_tests() {
+  const int failed = RUN_ALL_TESTS();
+  if (failed != 0) return 1;
+  if (testing::GTEST_FLAG(list_tests)) return 0;
+  const testing::UnitTest& unit = *testing::UnitTest::GetInstance();
+  if (unit.test_to_run_count() > 0 || is_unfiltered_shard()) return 0;
+  std::fprintf(stderr, "orrery: no test ran (--gtest_filter=%s matches none of %d)\n",
+               testing::GTEST_FLAG(filter).c_str(), unit.total_test_count());
+  return 2;
+}
+
+}  // namespace orrery

@@ -1,0 +1,16 @@
+/// Prints what a failure needs besides its assertion, and keeps a program that ran nothing from
+/// passing.
+#pragma once
+
+#include <orrery/harness/kernel/simulator_only.hpp>
+
+namespace orrery {
+
+/// Appends the listener to GoogleTest's, once. Init does it.
+void install_listener();
+
+/// RUN_ALL_TESTS() with Orrery's exit codes: 0 passed, 1 failed, 2 nothing ran (listing, and empty
+/// shards of an unfiltered run, excepted).
+int run_all_tests();
+
+}  // namespace orrery

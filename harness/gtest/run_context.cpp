@@ -1,0 +1,63 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <orrery/harness/gtest/flags.hpp>
+#include <orrery/harness/gtest/run_context.hpp>
+#include <utility>
+#include <vector>
+
+namespace orrery {
+namespace {
+
+std::vector<LiveRun*>& live_runs() {
+  thread_local std::vector<LiveRun*> runs;
+  return runs;
+}
+
+std::string describe(const RunSnapshot& s) {
+  std::string text = "  seed " + std::to_string(s.seed) + ", simulated " + to_string(s.elapsed) +
+                     " (" + to_string(s.now) + "), " + std::to_string(s.events) +
+                     " events, fingerprint " + s.fingerprint + "\n";
+  if (!s.last_event.empty()) text += "  last event: " + s.last_event + "\n";
+  return text + s.spacecraft;
+}
+
+std::string quoted_filter(const testing::TestInfo& test) {
+  return std::string("--gtest_filter='") + test.test_suite_name() + "." + test.name() + "'";
+}
+
+}  // namespace
+
+LiveRun::LiveRun(std::function<RunSnapshot()> snapshot) : snapshot_(std::move(snapshot)) {
+  live_runs().push_back(this);
+}
+
+LiveRun::~LiveRun() {
+  auto& runs = live_runs();
+  runs.erase(std::remove(runs.begin(), runs.end(), this), runs.end());
+}
+
+std::string describe_live_runs() {
+  std::string text;
+  for (const LiveRun* run : live_runs()) text += describe(run->snapshot_());
+  return text;
+}
+
+std::string replay_command() {
+  const testing::TestInfo* test = testing::UnitTest::GetInstance()->current_test_info();
+  if (test == nullptr) return {};
+  std::string command = program_name() + " " + quoted_filter(*test) +
+                        " --orrery_seed=" + std::to_string(flags().seed);
+  if (flags().runs) command += " --orrery_runs=" + std::to_string(*flags().runs);
+  return command;
+}
+
+std::string debug_command(Duration elapsed) {
+  const std::string replay = replay_command();
+  if (replay.empty()) return {};
+  const std::string at = to_string(elapsed);  // "12.5 s"
+  return "gdb -ex 'break sim_debug_break' -ex run --args " + replay +
+         " --orrery_break_at=" + at.substr(0, at.find(' '));
+}
+
+}  // namespace orrery

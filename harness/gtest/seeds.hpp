@@ -1,0 +1,19 @@
+/// Every run must pass: INSTANTIATE_TEST_SUITE_P(Seeds, SwarmTest, orrery::Seeds(200)).
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <iosfwd>
+#include <orrery/harness/kernel/run_id.hpp>
+
+namespace orrery {
+
+/// RunIds 0 ... n-1 with seeds base, base+1 ... The base is --orrery_seed, else ORRERY_SEED, else
+/// 1;
+/// --orrery_runs replaces n. @throws std::invalid_argument  n < 1.
+testing::internal::ParamGenerator<RunId> Seeds(int n);
+
+/// "seed 17 (run 16)"
+void PrintTo(const RunId& run, std::ostream* os);
+
+}  // namespace orrery
