@@ -1,24 +1,20 @@
-# Two interface targets carry how the project's own code is compiled. Neither reaches a consumer.
-#   orrery_numerics  what equal bits need (every simulator and flight target)
-#   orrery_warnings  warnings, and errors in CI
+# Interface targets carry how the project's own code is compiled. None reaches a consumer.
+#   orrery_numerics    what equal bits need, and the sanitizers (every simulator and flight target)
+#   orrery_sanitizers  ORRERY_SANITIZE alone
+#   orrery_warnings    warnings, and errors in CI
 
-# A compiler may fold libm calls on constants or rewrite pow(x, 2); g++ and clang do so differently,
-# and -O0 differs from -O2. Keeping the calls as calls is what makes builds agree.
-set(orrery_libm_functions
-  acos acosh asin asinh atan atan2 atanh cbrt cos cosh exp exp2 expm1 fmod hypot log log10 log1p log2
-  pow remainder sin sincos sinh tan tanh)
-set(ORRERY_NUMERIC_FLAGS -ffp-contract=off -fno-fast-math)
-foreach(function IN LISTS orrery_libm_functions)
-  list(APPEND ORRERY_NUMERIC_FLAGS -fno-builtin-${function})
-endforeach()
+include(OrreryNumerics)
+add_library(orrery_sanitizers INTERFACE)
+if(ORRERY_SANITIZE)
+  set(ORRERY_SANITIZE_LINK_OPTIONS -fsanitize=${ORRERY_SANITIZE})
+  target_compile_options(orrery_sanitizers INTERFACE
+    -fsanitize=${ORRERY_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(orrery_sanitizers INTERFACE ${ORRERY_SANITIZE_LINK_OPTIONS})
+endif()
 
 add_library(orrery_numerics INTERFACE)
 target_compile_options(orrery_numerics INTERFACE ${ORRERY_NUMERIC_FLAGS})
-if(ORRERY_SANITIZE)
-  target_compile_options(orrery_numerics INTERFACE
-    -fsanitize=${ORRERY_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
-  target_link_options(orrery_numerics INTERFACE -fsanitize=${ORRERY_SANITIZE})
-endif()
+target_link_libraries(orrery_numerics INTERFACE orrery_sanitizers)
 
 add_library(orrery_warnings INTERFACE)
 target_compile_options(orrery_warnings INTERFACE

@@ -14,9 +14,14 @@ function(orrery_library name)
   add_library(orrery::${name} ALIAS orrery_${name})
   set_target_properties(orrery_${name} PROPERTIES EXPORT_NAME ${name} VERIFY_INTERFACE_HEADER_SETS ON)
   target_compile_features(orrery_${name} PUBLIC cxx_std_20)
+  # Read by orrery::flight_abi; everything that links this library has it, too.
+  set_target_properties(orrery_${name} PROPERTIES ORRERY_SIMULATOR ON INTERFACE_ORRERY_SIMULATOR ON
+    COMPATIBLE_INTERFACE_BOOL ORRERY_SIMULATOR)
   # Linked in the build tree only: neither flags nor warnings reach a consumer.
   target_link_libraries(orrery_${name} PRIVATE
     $<BUILD_INTERFACE:orrery_numerics> $<BUILD_INTERFACE:orrery_warnings>)
+  # Whatever links code built with a sanitizer needs its runtime.
+  target_link_options(orrery_${name} INTERFACE ${ORRERY_SANITIZE_LINK_OPTIONS})
   set_property(GLOBAL APPEND PROPERTY ORRERY_INSTALLED_TARGETS orrery_${name})
 endfunction()
 
@@ -42,9 +47,7 @@ function(orrery_suite name)
     set(arg_TIMEOUT 120)
   endif()
   target_compile_definitions(${name} PRIVATE ORRERY_REFERENCE_DATA="${ORRERY_REFERENCE_DATA}")
-  include(GoogleTest)
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
-    PROPERTIES LABELS "${arg_LABELS}" TIMEOUT ${arg_TIMEOUT})
+  orrery_discover_tests(${name} "${arg_LABELS}" ${arg_TIMEOUT})
 endfunction()
 
 # orrery_bench(name SOURCES ... LINK ...): a Google Benchmark program. ctest runs each briefly, so that
