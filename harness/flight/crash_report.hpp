@@ -1,0 +1,50 @@
+/// What is known about the end of a flight process that crashed.
+#pragma once
+
+#include <cstdint>
+#include <orrery/harness/kernel/bytes.hpp>
+#include <orrery/harness/kernel/time.hpp>
+#include <string>
+#include <vector>
+
+namespace orrery {
+
+enum class CrashKind : std::uint8_t {
+  kSignal,         // SIGSEGV, SIGBUS, SIGFPE, SIGILL; a stack overflow is a SIGSEGV
+  kAbort,          // abort(), a failed assert
+  kException,      // an exception that nothing in the library caught
+  kExit,           // exit()
+  kFatalStatus,    // the library returned ORRERY_FATAL
+  kUnknownStatus,  // the library returned a status that the ABI does not know
+  kBootFailure,    // create returned anything but ORRERY_OK
+  kHeapFault,      // double free, free of what is no block, overwritten block header
+  kHeapExhausted,  // passed the cap, with HeapExhaustion::kCrash
+};
+const char* to_string(CrashKind kind);
+
+/// One call on the stack, innermost first.
+struct StackFrame {
+  std::uintptr_t address = 0;
+  std::string object;         // file, as the loader knows it: addr2line takes it
+  std::uintptr_t offset = 0;  // of the address in that file
+  std::string function;       // demangled; empty if the file does not tell
+};
+
+struct CrashReport {
+  std::string spacecraft, process, library;
+  SimTime t;                    // truth
+  std::int64_t onboard_ns = 0;  // what the process was told
+  CrashKind kind = CrashKind::kSignal;
+  int signal = 0;                     // 0 where none was raised
+  std::int32_t status = 0;            // what the library returned, where it did
+  std::string message;                // one line: what happened, in words
+  std::string call;                   // "load", "create", "input", "tick", "destroy"
+  std::string port;                   // of an input
+  ByteBuffer input;                   // the bytes of that input
+  std::vector<StackFrame> backtrace;  // empty where the library returned a status
+};
+
+/// Several lines for people. Addresses are in it: never for a fingerprint.
+std::string to_string(const CrashReport& report);
+
+}  // namespace orrery

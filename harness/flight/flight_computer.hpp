@@ -1,0 +1,82 @@
+/// Binds a flight process to the event loop: inputs, ticks, outputs, the processor's time.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <orrery/harness/flight/flight_process.hpp>
+#include <orrery/harness/flight/onboard_clock.hpp>
+#include <orrery/harness/kernel/event_loop.hpp>
+#include <string_view>
+#include <vector>
+
+namespace orrery {
+
+/// One processor with one process.
+///
+/// Calls    An input is an event of Phase::kDelivery, the tick one of Phase::kTick. A call starts
+///          when the processor is free and runs at once on the host; its outputs leave at start +
+///          execution time, in order, as events of Phase::kOutput.
+/// Queue    While the processor is busy 64 inputs of 1 MiB together wait; of more the newest is
+///          dropped and counted. The tick waits beside them, and goes first if it was due earlier.
+/// Tick     One pending. A new request replaces it, a negative one withdraws it; one in the past
+///          fires when the call that asked for it has ended.
+/// Crash    Outputs and tick request of the crashed call are discarded, as are outputs that had not
+///          left yet and waiting inputs; then Hooks::on_crash decides. A dead process gets nothing.
+/// Events   Kinds 100-106; none allocates once the buffers have grown to their sizes.
+class FlightComputer {
+ public:
+  /// Called in simulator context; each may be empty. on_crash and on_output may throw.
+  struct Hooks {
+    std::function<void(std::string_view port, Bytes)> on_output;
+    std::function<void(LogLevel, std::string_view line)> on_log;
+    std::function<void(const CrashReport&)> on_crash;
+    std::function<void(const CallRecord&)> on_call;
+  };
+
+  /// Loads the library. The loop must outlive the computer.
+  /// @throws std::invalid_argument  as FlightProcess, and for a negative execution time.
+  FlightComputer(EventLoop& loop, OwnerId owner, FlightProcessOptions options, Hooks hooks);
+  ~FlightComputer();
+  FlightComputer(const FlightComputer&) = delete;
+  FlightComputer& operator=(const FlightComputer&) = delete;
+
+  /// Schedules `create` now, before the devices and inputs of this instant.
+  /// @throws std::logic_error  booted before.
+  void boot();
+  /// Orderly end, now; waiting inputs and the tick are dropped. Nothing if not alive.
+  void shut_down();
+
+  const FlightProcessOptions& options() const;
+  const std::vector<FlightPort>& ports() const;
+  bool has_input(std::string_view port) const;
+  bool has_output(std::string_view port) const;
+
+  /// Schedules `bytes` for delivery now, as an event from `origin`. A packet above the port's
+  /// max_bytes is rejected when it is delivered; a stream is cut into calls.
+  /// @throws std::invalid_argument  no such input port; the message lists those that exist.
+  void deliver(std::string_view port, Bytes bytes, OwnerId origin);
+
+  bool alive() const;
+  std::uint64_t crashes() const;
+  std::uint64_t calls() const;              // create, inputs, ticks
+  std::uint64_t rejected() const;           // inputs and ticks that the library rejected, and
+                                            // packets too long for their port
+  std::uint64_t inputs_lost() const;        // came while the process was not alive, or died waiting
+  std::uint64_t outputs_discarded() const;  // by a crash
+  /// Dropped because the queue was full. @throws std::invalid_argument  no such input port.
+  std::uint64_t dropped(std::string_view port) const;
+
+  HeapFigures heap() const;
+  /// @throws std::invalid_argument  above 4 GiB less 1 MiB.
+  void set_heap_limit(std::uint64_t bytes);
+  std::int64_t onboard_ns() const;  // what the spacecraft's clock shows now
+  OnboardClock& clock();
+  Duration host_time_in_flight() const;  // for reports only
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace orrery

@@ -1,0 +1,120 @@
+/// One instance of a flight library: its globals, its heap, its storage, and the boundary around
+/// it.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <orrery/harness/flight/crash_report.hpp>
+#include <orrery/harness/flight/flight_options.hpp>
+#include <orrery/harness/heap/heap_figures.hpp>
+#include <orrery/harness/kernel/bytes.hpp>
+#include <orrery/harness/kernel/time.hpp>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace orrery {
+
+enum class PortDirection : std::uint8_t { kIn, kOut };
+enum class PortKind : std::uint8_t { kPacket, kStream };
+
+/// A row of a library's port table.
+struct FlightPort {
+  std::string name;
+  PortDirection direction = PortDirection::kIn;
+  PortKind kind = PortKind::kPacket;
+  std::uint32_t id = 0;         // the library's own number
+  std::uint32_t max_bytes = 0;  // of one call
+};
+
+/// Levels of log lines, as the ABI numbers them.
+enum class LogLevel : std::int32_t { kDebug = 0, kInfo = 1, kWarning = 2, kError = 3 };
+
+/// What one call of a process left behind.
+enum class CallOutcome : std::uint8_t { kDone, kRejected, kCrashed };
+
+/// Heap of a process around one call.
+struct CallRecord {
+  SimTime t;
+  std::uint64_t resting_bytes = 0;         // live when the call returned
+  std::uint64_t transient_peak_bytes = 0;  // most live at once within the call
+  std::uint64_t heap_bytes = 0;
+  std::uint64_t largest_free_bytes = 0;
+  std::uint64_t allocations = 0;  // within the call
+};
+
+/// Runs flight code to completion and keeps it from the simulator, and the simulator from it.
+///
+/// Boundary   Within a call the process's heap is current and `sim_process` names it; MXCSR and the
+///            x87 control word are put back after it, and reported once if they had changed. Host
+///            callbacks run without a heap. Payloads are copied as flight code, so that a bad
+///            pointer ends the process, not the simulator.
+/// Crash      See CrashKind. The process is dead: its heap is dropped, no destructor of it runs.
+///            A signal raised by simulator code, within a callback too, is not contained.
+/// Isolation  kCopy runs the library's static constructors within that boundary, kShared under no
+///            heap when the library is loaded first.
+class FlightProcess {
+ public:
+  /// Loads the library; nothing of it runs yet but, with kShared, its static constructors.
+  /// @throws std::invalid_argument  the library is missing, does not load, or breaks the ABI; an
+  ///                                option outside its range. The message says which and why.
+  explicit FlightProcess(FlightProcessOptions options);
+  ~FlightProcess();  // as shut_down(), if still alive
+  FlightProcess(const FlightProcess&) = delete;
+  FlightProcess& operator=(const FlightProcess&) = delete;
+
+  const FlightProcessOptions& options() const;
+  const std::vector<FlightPort>& ports() const;
+
+  /// The calls. `truth` is for reports only, the library sees `onboard_ns`.
+  /// @throws std::logic_error  create() twice; the others unless alive(); any within another call.
+  CallOutcome create(SimTime truth, std::int64_t onboard_ns, std::uint32_t boot_count,
+                     std::uint32_t reset_cause);
+  CallOutcome input(SimTime truth, std::int64_t onboard_ns, const FlightPort& port, Bytes data);
+  CallOutcome tick(SimTime truth, std::int64_t onboard_ns);
+  /// Orderly end: destroy, then the library's static destructors.
+  CallOutcome shut_down(SimTime truth, std::int64_t onboard_ns);
+
+  bool alive() const;     // created, neither crashed nor shut down
+  bool has_tick() const;  // the library has a tick function
+
+  /// Of the last call, until the next; none after a crash.
+  struct Output {
+    const FlightPort* port = nullptr;
+    Bytes data;
+  };
+  std::size_t output_count() const;
+  Output output(std::size_t index) const;
+  /// Onboard time asked for by the last call; negative: withdrawn; empty: the pending tick stays.
+  std::optional<std::int64_t> tick_request() const;
+  struct LogLine {
+    LogLevel level = LogLevel::kInfo;
+    std::string_view text;
+  };
+  /// Kept after a crash.
+  std::size_t log_count() const;
+  LogLine log_line(std::size_t index) const;
+  const CallRecord& call_record() const;
+  /// Of the last call that returned CallOutcome::kCrashed.
+  const CrashReport& crash() const;
+
+  HeapFigures heap() const;
+  /// Below what the heap already has is allowed: it stops growing.
+  /// @throws std::invalid_argument  above 4 GiB less 1 MiB.
+  void set_heap_limit(std::uint64_t bytes);
+  /// Non-volatile storage; it outlives crash and shut-down, and may be handed to the next process.
+  using Storage = std::vector<std::pair<std::uint32_t, ByteBuffer>>;  // by slot number, ascending
+  const Storage& storage() const;
+  void set_storage(Storage storage);
+
+  /// Host time spent within calls, for reports only: it repeats in no run.
+  Duration host_time_in_flight() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace orrery
