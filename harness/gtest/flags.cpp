@@ -1,10 +1,11 @@
+#include <orrery/harness/gtest/flags.hpp>
+#include <orrery/harness/gtest/listener.hpp>
+
 #include <charconv>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
 #include <map>
-#include <orrery/harness/gtest/flags.hpp>
-#include <orrery/harness/gtest/listener.hpp>
 #include <stdexcept>
 #include <string_view>
 

@@ -2,10 +2,11 @@
 /// wins.
 #pragma once
 
-#include <cstdint>
-#include <optional>
 #include <orrery/harness/kernel/simulator_only.hpp>
 #include <orrery/harness/kernel/time.hpp>
+
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 

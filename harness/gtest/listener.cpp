@@ -1,9 +1,10 @@
+#include <orrery/harness/gtest/listener.hpp>
+#include <orrery/harness/gtest/run_context.hpp>
+
 #include <gtest/gtest.h>
 
 #include <cstdio>
 #include <cstdlib>
-#include <orrery/harness/gtest/listener.hpp>
-#include <orrery/harness/gtest/run_context.hpp>
 #include <string>
 
 namespace orrery {

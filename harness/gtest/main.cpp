@@ -1,7 +1,7 @@
-#include <gmock/gmock.h>
-
 #include <orrery/harness/gtest/flags.hpp>
 #include <orrery/harness/gtest/listener.hpp>
+
+#include <gmock/gmock.h>
 
 int main(int argc, char** argv) {
   orrery::Init(&argc, argv);

@@ -1,8 +1,9 @@
+#include <orrery/harness/gtest/flags.hpp>
+#include <orrery/harness/gtest/run_context.hpp>
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <orrery/harness/gtest/flags.hpp>
-#include <orrery/harness/gtest/run_context.hpp>
 #include <utility>
 #include <vector>
 

@@ -1,9 +1,10 @@
 /// What a failure message needs to know of the runs that are alive.
 #pragma once
 
+#include <orrery/harness/kernel/time.hpp>
+
 #include <cstdint>
 #include <functional>
-#include <orrery/harness/kernel/time.hpp>
 #include <string>
 
 namespace orrery {

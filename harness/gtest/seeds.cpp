@@ -1,5 +1,6 @@
 #include <orrery/harness/gtest/flags.hpp>
 #include <orrery/harness/gtest/seeds.hpp>
+
 #include <ostream>
 #include <stdexcept>
 #include <vector>

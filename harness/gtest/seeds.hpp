@@ -1,10 +1,11 @@
 /// Every run must pass: INSTANTIATE_TEST_SUITE_P(Seeds, SwarmTest, orrery::Seeds(200)).
 #pragma once
 
+#include <orrery/harness/kernel/run_id.hpp>
+
 #include <gtest/gtest.h>
 
 #include <iosfwd>
-#include <orrery/harness/kernel/run_id.hpp>
 
 namespace orrery {
 

@@ -1,8 +1,9 @@
 /// Raw bytes, as they cross from devices to flight software and between spacecraft.
 #pragma once
 
-#include <cstddef>
 #include <orrery/harness/kernel/simulator_only.hpp>
+
+#include <cstddef>
 #include <span>
 #include <vector>
 

@@ -1,10 +1,11 @@
 /// What an event is, and in what order events run.
 #pragma once
 
-#include <compare>
-#include <cstdint>
 #include <orrery/harness/kernel/inline_function.hpp>
 #include <orrery/harness/kernel/time.hpp>
+
+#include <compare>
+#include <cstdint>
 
 namespace orrery {
 

@@ -5,6 +5,7 @@
 #include <orrery/harness/kernel/event.hpp>
 #include <orrery/harness/kernel/event_queue.hpp>
 #include <orrery/harness/kernel/fingerprint.hpp>
+
 #include <string>
 #include <string_view>
 #include <vector>

@@ -1,8 +1,9 @@
 /// Pending events, earliest first.
 #pragma once
 
-#include <cstddef>
 #include <orrery/harness/kernel/event.hpp>
+
+#include <cstddef>
 
 namespace orrery {
 

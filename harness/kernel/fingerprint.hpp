@@ -1,10 +1,11 @@
 /// Rolling hash of executed events, one chain per owner.
 #pragma once
 
-#include <cstdint>
-#include <optional>
 #include <orrery/harness/kernel/bytes.hpp>
 #include <orrery/harness/kernel/event.hpp>
+
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 

@@ -1,9 +1,10 @@
 /// A callable kept inside the object: no allocation, ever. What does not fit does not compile.
 #pragma once
 
+#include <orrery/harness/kernel/simulator_only.hpp>
+
 #include <cstddef>
 #include <new>
-#include <orrery/harness/kernel/simulator_only.hpp>
 #include <type_traits>
 #include <utility>
 

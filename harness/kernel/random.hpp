@@ -1,10 +1,11 @@
 /// Random streams: counter-based, each named by (seed, spacecraft, component, purpose).
 #pragma once
 
+#include <orrery/harness/kernel/simulator_only.hpp>
+
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <orrery/harness/kernel/simulator_only.hpp>
 #include <string>
 #include <string_view>
 

@@ -1,9 +1,10 @@
 /// Simulated time: integer nanoseconds of GPS time on a clock that cannot be asked for the time.
 #pragma once
 
+#include <orrery/harness/kernel/simulator_only.hpp>
+
 #include <chrono>
 #include <cstdint>
-#include <orrery/harness/kernel/simulator_only.hpp>
 #include <string>
 
 namespace orrery {

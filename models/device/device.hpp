@@ -7,6 +7,7 @@
 #include <orrery/harness/kernel/time.hpp>
 #include <orrery/models/frames/vector.hpp>
 #include <orrery/models/orbit/force_model.hpp>
+
 #include <string_view>
 
 namespace orrery {

@@ -1,8 +1,9 @@
 /// Three-vectors, 3x3 matrices and quaternions: plain values with public components.
 #pragma once
 
-#include <cmath>
 #include <orrery/harness/kernel/simulator_only.hpp>
+
+#include <cmath>
 
 namespace orrery {
 

@@ -1,9 +1,10 @@
 /// What a force on a spacecraft is. Derive from ForceModel to add one; the ready ones do the same.
 #pragma once
 
-#include <optional>
 #include <orrery/harness/kernel/time.hpp>
 #include <orrery/models/frames/vector.hpp>
+
+#include <optional>
 #include <string_view>
 
 namespace orrery {
