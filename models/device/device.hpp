@@ -1,4 +1,9 @@
 /// Sensors, actuators and radios. Derive from Device to add one; the ready ones do the same.
+///
+/// A device sees its spacecraft and the world through its DeviceContext alone, and runs only when
+/// called: at power-on, by its own timers, by flight software, by a frame from the air. Flight
+/// software may write anything, so from_flight() and from_air() never throw because of what the
+/// bytes say: they reject, log and count.
 #pragma once
 
 #include <orrery/harness/kernel/bytes.hpp>
@@ -32,10 +37,11 @@ class DeviceContext {
   /// The device's own stream (seed, spacecraft, device, purpose). Keep the reference if you like.
   virtual RandomStream& random(std::string_view purpose) = 0;
 
-  /// Runs `action` once, `delay` from now. @throws std::invalid_argument  negative delay.
+  /// Runs `action` once, `delay` from now, unless cancelled or the device loses power before that.
+  /// @throws std::invalid_argument  negative delay.
   virtual EventHandle after(Duration delay, Action action) = 0;
-  /// Runs `action` now, then every `period`, until cancelled or the device loses power.
-  /// @throws std::invalid_argument  period <= 0.
+  /// Runs `action` now, then every `period`, until cancelled or the device loses power. The handle
+  /// stays good for all repetitions. @throws std::invalid_argument  period <= 0.
   virtual EventHandle every(Duration period, Action action) = 0;
   virtual bool cancel(EventHandle handle) = 0;
 
@@ -51,8 +57,9 @@ class DeviceContext {
 
   /// Adds a sample to the channel "<spacecraft>/<device>/<channel>".
   virtual void record(std::string_view channel, double value) = 0;
-  /// A message in the run's log: LEVEL is 0 debug, 1 info, 2 warning, 3 error.
+  /// A message in the run's log. The levels are those of orrery_flight.h.
   virtual void log(int level, std::string_view line) = 0;
+  static constexpr int kDebug = 0, kInfo = 1, kWarning = 2, kError = 3;
   /// Value of a named fault parameter of this device; `nominal` while no fault is active.
   virtual double fault(std::string_view name, double nominal) const = 0;
 };

@@ -1,1 +1,0 @@
-#include <orrery/models/device/device.hpp>
