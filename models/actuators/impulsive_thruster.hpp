@@ -1,0 +1,63 @@
+/// A thruster whose burns are impulses: each changes the velocity at once, in the middle of the
+/// burn.
+#pragma once
+
+#include <orrery/models/device/device.hpp>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace orrery {
+
+struct ImpulsiveThrusterOptions {
+  Duration minimum_lead = 20s;      // a command must be this much ahead of its burn; at least 0
+  Duration maximum_lead = 24h * 7;  // and no more than this, at least minimum_lead
+  double maximum_dv_mps = 1.0;      // of one burn, above 0
+};
+
+/// Device "thruster". Takes the message `thruster` of orrery_messages.h: mid-burn epoch on the
+/// onboard clock, delta-v in EME2000.
+///
+/// Burns     The epoch becomes truth with the clock as it is when the command arrives. Any number
+///           may be pending. Losing power drops them.
+/// Rejected  and logged as a warning, never thrown, since flight software wrote it: a wrong length,
+///           a component that is not finite, a delta-v above the maximum, a lead out of range.
+/// Fault     "lost": if it is not 0 at the burn, nothing happens, but the burn counts as due.
+/// Channel   "dv_mps": magnitude delivered at each burn, 0 if lost.
+class ImpulsiveThruster final : public Device {
+ public:
+  using Options = ImpulsiveThrusterOptions;
+
+  struct Burn {
+    SimTime t;
+    Vec3 dv_ECI;           // commanded [m/s]
+    bool executed = true;  // false: lost
+  };
+
+  /// @throws std::invalid_argument  an option outside its range.
+  explicit ImpulsiveThruster(const Options& options = {});
+
+  std::string_view name() const override { return "thruster"; }
+  void start(DeviceContext& io) override { (void)io; }
+  void from_flight(DeviceContext& io, Bytes bytes) override;
+
+  /// Burns whose time has come, lost ones included.
+  int burns() const { return static_cast<int>(burn_log_.size()); }
+  const std::vector<Burn>& burn_log() const { return burn_log_; }
+  /// Sum of |dv| over the burns that were executed.
+  double delta_v_mps() const { return delta_v_mps_; }
+  /// Commands not accepted.
+  int rejected() const { return rejected_; }
+
+ private:
+  void reject(DeviceContext& io, const std::string& why);
+  void burn(DeviceContext& io, const Vec3& dv_ECI);
+
+  Options options_;
+  std::vector<Burn> burn_log_;
+  double delta_v_mps_ = 0;
+  int rejected_ = 0;
+};
+
+}  // namespace orrery
