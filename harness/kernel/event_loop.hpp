@@ -6,8 +6,8 @@
 #include <orrery/harness/kernel/event_queue.hpp>
 #include <orrery/harness/kernel/fingerprint.hpp>
 
+#include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace orrery {
@@ -24,20 +24,26 @@ struct EventSpec {
 ///
 /// Fingerprint  Each event except those of Phase::kRecorder is mixed into the chain of its
 ///              destination when it is executed; payload bytes are added by the action itself, with
-///              fingerprint_payload().
-/// Errors       Scheduling before now() throws std::invalid_argument with both times.
+///              fingerprint_payload(). Recorder events have counters of their own, so that turning
+///              recording on changes neither the fingerprint nor the order of the others.
+/// Exceptions   An action may throw: the event counts as executed, and the loop can go on.
+/// Reads        sim_now and sim_event (sim_state.hpp) follow the loop that last moved.
+/// Errors       Scheduling before now() throws std::invalid_argument with both times. Actions
+///              schedule and cancel; running or advancing the loop from one is std::logic_error.
 class EventLoop {
  public:
   explicit EventLoop(SimTime start);
 
   /// Ids are 0, 1, 2 ... in order of the calls. @throws std::length_error  after 65535.
   OwnerId add_owner(std::string name);
+  /// @throws std::out_of_range  no such owner.
   const std::string& owner_name(OwnerId id) const;
-  std::size_t owner_count() const;
+  std::size_t owner_count() const { return owners_.size(); }
 
   SimTime now() const { return now_; }
 
-  /// @throws std::invalid_argument  `t` before now(), an unknown owner, or a null kind.
+  /// @throws std::invalid_argument  `t` before now(), an unknown owner, a null kind, or an empty
+  ///                                action.
   EventHandle schedule(SimTime t, const EventSpec& spec, Action action);
   /// True if the event was pending; false if it has run, was cancelled or never was.
   bool cancel(EventHandle handle);
@@ -49,30 +55,46 @@ class EventLoop {
   bool run_next(SimTime t);
   /// Sets now() to t. @throws std::logic_error  an event before or at t is pending; t before now().
   void advance_to(SimTime t);
+  /// Instant of the earliest pending event.
+  std::optional<SimTime> next_event_time() { return queue_.next_time(); }
 
   /// Within an action: adds these bytes, and their length, to the fingerprint of the running event.
+  /// Does nothing in a recorder's event. @throws std::logic_error  no event is running.
   void fingerprint_payload(Bytes payload);
 
   const Fingerprint& fingerprint() const { return fingerprint_; }
-  /// From here on, keep every executed event, so that two runs can be compared event by event.
-  void keep_log(bool keep);
+  /// From here on, keep every executed event (the recorder's excepted), so that two runs can be
+  /// compared event by event.
+  void keep_log(bool keep) { keep_log_ = keep; }
   const std::vector<EventRecord>& log() const { return log_; }
+  /// Without the recorder's: the n-th event is the same one whatever is recorded.
   std::uint64_t events_executed() const { return executed_; }
   std::size_t events_pending() const { return queue_.size(); }
   /// Kind of the running event, for crash reports; null between events.
   const EventKind* current_kind() const { return current_kind_; }
 
  private:
+  struct Owner {
+    std::string name;
+    std::uint64_t scheduled = 0;  // the counter of EventKey
+    std::uint64_t recorded = 0;   // the same for Phase::kRecorder
+  };
+  class Running;
+
+  void require_owner(OwnerId id, const char* role) const;
+  void require_between_events(const char* function) const;
+  void move_to(SimTime t);
+
   EventQueue queue_;
   Fingerprint fingerprint_;
-  std::vector<std::string> owners_;
-  std::vector<std::uint64_t> counters_;
+  std::vector<Owner> owners_;
   std::vector<EventRecord> log_;
   SimTime now_;
   const EventKind* current_kind_ = nullptr;
   OwnerId current_owner_ = 0;
-  std::uint64_t executed_ = 0;
+  bool in_fingerprint_ = false;  // the running event is
   bool keep_log_ = false;
+  std::uint64_t executed_ = 0;
 };
 
 }  // namespace orrery

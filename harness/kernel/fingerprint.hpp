@@ -3,6 +3,7 @@
 
 #include <orrery/harness/kernel/bytes.hpp>
 #include <orrery/harness/kernel/event.hpp>
+#include <orrery/harness/kernel/hash.hpp>
 
 #include <cstdint>
 #include <optional>
@@ -18,6 +19,7 @@ struct EventRecord {
   std::uint64_t chain = 0;  // the destination's chain after this event, payload included
 };
 
+/// The hash of what a run did (hash.hpp). Doubles in a payload go through fingerprint_bits().
 class Fingerprint {
  public:
   void add_owner();
@@ -33,7 +35,7 @@ class Fingerprint {
   std::vector<std::uint64_t> chains_;
 };
 
-/// The first place at which two logs differ.
+/// The first place at which two logs differ. Equal keys there mean that the payload differed.
 struct EventDifference {
   std::size_t index = 0;            // in both logs
   std::optional<EventRecord> a, b;  // empty: that log ended here

@@ -4,6 +4,7 @@
 #include <orrery/harness/kernel/simulator_only.hpp>
 
 #include <cstddef>
+#include <cstring>
 #include <new>
 #include <type_traits>
 #include <utility>
@@ -54,7 +55,11 @@ class InlineFunction<R(Args...), kCapacity> {
   template <class Held>
   static constexpr Table kTable = {
       [](void* held, Args... args) -> R {
-        return (*static_cast<Held*>(held))(std::forward<Args>(args)...);
+        if constexpr (std::is_void_v<R>) {
+          static_cast<void>((*static_cast<Held*>(held))(std::forward<Args>(args)...));
+        } else {
+          return (*static_cast<Held*>(held))(std::forward<Args>(args)...);
+        }
       },
       std::is_trivially_copyable_v<Held> ? nullptr
                                          : +[](void* from, void* to) {
@@ -75,7 +80,8 @@ class InlineFunction<R(Args...), kCapacity> {
     if (table_->relocate != nullptr) {
       table_->relocate(other.storage_, storage_);
     } else {
-      for (std::size_t i = 0; i < kCapacity; ++i) storage_[i] = other.storage_[i];
+      // All of it: a copy of constant size is a few moves, and cheaper than knowing the size.
+      std::memcpy(storage_, other.storage_, kCapacity);
     }
     other.table_ = nullptr;
   }

@@ -1,0 +1,138 @@
+#include <orrery/harness/kernel/event_loop.hpp>
+#include <orrery/harness/kernel/sim_state.hpp>
+
+#include <stdexcept>
+#include <utility>
+
+namespace orrery {
+namespace {
+
+// One owner less than ids, so that a count of owners fits where an id does.
+constexpr std::size_t kMostOwners = 65535;
+
+std::string before_now(const char* function, SimTime t, SimTime now) {
+  return std::string("EventLoop::") + function + ": t = " + to_string(t) + " is before now, " +
+         to_string(now);
+}
+
+}  // namespace
+
+// The time during which an event runs. Its end restores the loop, after an exception as well.
+class EventLoop::Running {
+ public:
+  Running(EventLoop& loop, const Event& event) : loop_(loop), event_(event) {
+    loop.current_kind_ = event.kind;
+    loop.current_owner_ = event.key.destination;
+    loop.in_fingerprint_ = event.key.phase != Phase::kRecorder;
+    if (!loop.in_fingerprint_) return;
+    sim_event = ++loop.executed_;
+    loop.fingerprint_.event(event.key, event.kind->id);
+  }
+  Running(const Running&) = delete;
+  Running& operator=(const Running&) = delete;
+  ~Running() {
+    if (loop_.keep_log_ && loop_.in_fingerprint_) {
+      loop_.log_.push_back(
+          {event_.key, event_.kind, loop_.fingerprint_.chain(event_.key.destination)});
+    }
+    loop_.current_kind_ = nullptr;
+  }
+
+ private:
+  EventLoop& loop_;
+  const Event& event_;
+};
+
+EventLoop::EventLoop(SimTime start) {
+  move_to(start);
+  sim_event = 0;
+}
+
+OwnerId EventLoop::add_owner(std::string name) {
+  if (owners_.size() == kMostOwners) {
+    throw std::length_error("EventLoop::add_owner: '" + name + "' would be owner 65536 of 65535");
+  }
+  owners_.push_back({std::move(name), 0, 0});
+  fingerprint_.add_owner();
+  return static_cast<OwnerId>(owners_.size() - 1);
+}
+
+const std::string& EventLoop::owner_name(OwnerId id) const {
+  if (id >= owners_.size()) {
+    throw std::out_of_range("EventLoop::owner_name: id = " + std::to_string(id) + ", there are " +
+                            std::to_string(owners_.size()) + " owners");
+  }
+  return owners_[id].name;
+}
+
+EventHandle EventLoop::schedule(SimTime t, const EventSpec& spec, Action action) {
+  if (t < now_) throw std::invalid_argument(before_now("schedule", t, now_));
+  require_owner(spec.destination, "destination");
+  require_owner(spec.origin, "origin");
+  if (spec.kind == nullptr) throw std::invalid_argument("EventLoop::schedule: kind is null");
+  Owner& origin = owners_[spec.origin];
+  std::uint64_t& counter = spec.phase == Phase::kRecorder ? origin.recorded : origin.scheduled;
+  const EventKey key{t, spec.phase, spec.destination, spec.origin, counter};
+  const EventHandle handle = queue_.push(key, spec.kind, std::move(action));
+  ++counter;
+  return handle;
+}
+
+bool EventLoop::cancel(EventHandle handle) {
+  return queue_.cancel(handle);
+}
+
+void EventLoop::run_until(SimTime t) {
+  if (t < now_) throw std::invalid_argument(before_now("run_until", t, now_));
+  while (run_next(t)) {
+  }
+  move_to(t);
+}
+
+bool EventLoop::run_next(SimTime t) {
+  require_between_events("run_next");
+  Event event;
+  if (!queue_.pop(t, event)) return false;
+  move_to(event.key.t);
+  const Running running(*this, event);
+  event.action();
+  return true;
+}
+
+void EventLoop::advance_to(SimTime t) {
+  require_between_events("advance_to");
+  if (t < now_) throw std::logic_error(before_now("advance_to", t, now_));
+  const std::optional<SimTime> next = queue_.next_time();
+  if (next && *next <= t) {
+    throw std::logic_error("EventLoop::advance_to: t = " + to_string(t) +
+                           " is not before the next event, " + to_string(*next));
+  }
+  move_to(t);
+}
+
+void EventLoop::fingerprint_payload(Bytes payload) {
+  if (current_kind_ == nullptr) {
+    throw std::logic_error("EventLoop::fingerprint_payload: no event is running");
+  }
+  if (in_fingerprint_) fingerprint_.payload(current_owner_, payload);
+}
+
+void EventLoop::require_owner(OwnerId id, const char* role) const {
+  if (id < owners_.size()) return;
+  throw std::invalid_argument("EventLoop::schedule: " + std::string(role) + " = " +
+                              std::to_string(id) + ", there are " + std::to_string(owners_.size()) +
+                              " owners");
+}
+
+void EventLoop::require_between_events(const char* function) const {
+  if (current_kind_ == nullptr) return;
+  throw std::logic_error(std::string("EventLoop::") + function + ": called from event '" +
+                         current_kind_->name + "'; an action schedules, it does not run the loop");
+}
+
+void EventLoop::move_to(SimTime t) {
+  now_ = t;
+  sim_now = to_ns(t);
+}
+
+}  // namespace orrery
