@@ -1,1 +1,26 @@
-# install(EXPORT) and orreryConfig.cmake
+# install(EXPORT) and orreryConfig.cmake. Headers of the simulator go below include/orrery, the flight
+# ABI's to an include root of its own, so that flight software cannot see the one through the other.
+include(CMakePackageConfigHelpers)
+set(orrery_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/orrery)
+
+get_property(orrery_installed_targets GLOBAL PROPERTY ORRERY_INSTALLED_TARGETS)
+install(TARGETS ${orrery_installed_targets} EXPORT orreryTargets
+  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
+  OBJECTS DESTINATION ${CMAKE_INSTALL_LIBDIR}/orrery
+  FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+install(TARGETS orrery_flight_abi EXPORT orreryTargets
+  FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/orrery_flight_abi)
+install(EXPORT orreryTargets NAMESPACE orrery:: DESTINATION ${orrery_package_dir})
+
+configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/orreryConfig.cmake.in
+  ${PROJECT_BINARY_DIR}/orreryConfig.cmake INSTALL_DESTINATION ${orrery_package_dir}
+  NO_SET_AND_CHECK_MACRO)
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/orreryConfigVersion.cmake
+  COMPATIBILITY SameMinorVersion)   # below 1.0 a minor version may break its users
+install(FILES
+  ${PROJECT_BINARY_DIR}/orreryConfig.cmake
+  ${PROJECT_BINARY_DIR}/orreryConfigVersion.cmake
+  ${CMAKE_CURRENT_LIST_DIR}/OrreryErfa.cmake
+  ${CMAKE_CURRENT_LIST_DIR}/OrreryNumerics.cmake
+  ${CMAKE_CURRENT_LIST_DIR}/OrreryUser.cmake
+  DESTINATION ${orrery_package_dir})
