@@ -4,6 +4,8 @@ include(CMakePackageConfigHelpers)
 set(orrery_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/orrery)
 
 get_property(orrery_installed_targets GLOBAL PROPERTY ORRERY_INSTALLED_TARGETS)
+# What `cmake --install` needs, without tests and benchmarks.
+add_custom_target(orrery_package DEPENDS ${orrery_installed_targets})
 install(TARGETS ${orrery_installed_targets} EXPORT orreryTargets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
   OBJECTS DESTINATION ${CMAKE_INSTALL_LIBDIR}/orrery

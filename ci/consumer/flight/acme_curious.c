@@ -1,0 +1,2 @@
+/* Must not compile: flight software that includes the simulator. */
+#include <orrery/orrery.hpp>
