@@ -1,0 +1,211 @@
+#include <cmath>
+#include <orrery/models/orbit/orbit_dynamics.hpp>
+#include <string>
+
+namespace orrery {
+namespace {
+
+constexpr double kTwoPi = 6.283185307179586;
+
+QuasiNonsingularElements plus(const QuasiNonsingularElements& x, double s,
+                              const QuasiNonsingularElements& d) {
+  return {x.a_m + s * d.a_m,     x.ex + s * d.ex,           x.ey + s * d.ey,
+          x.i_rad + s * d.i_rad, x.raan_rad + s * d.raan_rad, x.u_rad + s * d.u_rad};
+}
+
+QuasiNonsingularElements weighted(const QuasiNonsingularElements& k1, const QuasiNonsingularElements& k2,
+                                  const QuasiNonsingularElements& k3,
+                                  const QuasiNonsingularElements& k4) {
+  QuasiNonsingularElements sum = plus(k1, 2, k2);
+  sum = plus(sum, 2, k3);
+  return plus(sum, 1, k4);
+}
+
+// One turn less when a turn is complete, so that years lose no digits.
+double unwound(double angle_rad) {
+  return angle_rad >= kTwoPi ? angle_rad - kTwoPi : angle_rad;
+}
+
+std::string describe(const OrbitState& s) {
+  const auto three = [](const Vec3& v) {
+    return "(" + std::to_string(v.x) + ", " + std::to_string(v.y) + ", " + std::to_string(v.z) + ")";
+  };
+  return to_string(s.t) + ", r_ECI = " + three(s.r_ECI) + " m, v_ECI = " + three(s.v_ECI) + " m/s";
+}
+
+// The orbit's geometry at one instant.
+struct Geometry {
+  double p, h, eta, n;
+  OrbitPoint point;
+  double sin_i, cos_i;
+  Vec3 R_ECI, T_ECI, N_ECI;
+};
+
+Geometry geometry(const QuasiNonsingularElements& x) {
+  Geometry g;
+  const double eta2 = 1 - x.ex * x.ex - x.ey * x.ey;
+  g.eta = std::sqrt(eta2);
+  g.p = x.a_m * eta2;
+  g.h = std::sqrt(kMuEarth_m3ps2 * g.p);
+  g.n = std::sqrt(kMuEarth_m3ps2 / x.a_m) / x.a_m;
+  g.point = solve_kepler(x);
+  g.sin_i = std::sin(x.i_rad), g.cos_i = std::cos(x.i_rad);
+  const double cO = std::cos(x.raan_rad), sO = std::sin(x.raan_rad);
+  const Vec3 node{cO, sO, 0}, ahead{-sO * g.cos_i, cO * g.cos_i, g.sin_i};
+  g.R_ECI = g.point.cos_theta * node + g.point.sin_theta * ahead;
+  g.T_ECI = -g.point.sin_theta * node + g.point.cos_theta * ahead;
+  g.N_ECI = {sO * g.sin_i, -cO * g.sin_i, g.cos_i};
+  return g;
+}
+
+InertialState inertial_state_at(const Geometry& g, const QuasiNonsingularElements& x) {
+  const double c = g.point.cos_theta, s = g.point.sin_theta;
+  const double mu_over_h = kMuEarth_m3ps2 / g.h;
+  return {g.point.r_m * g.R_ECI, mu_over_h * ((x.ex * s - x.ey * c) * g.R_ECI +
+                                              (1 + x.ex * c + x.ey * s) * g.T_ECI)};
+}
+
+// Battin's variational equations with (fR, fT, fN) the perturbing acceleration in RTN.
+QuasiNonsingularElements gauss(const Geometry& g, const QuasiNonsingularElements& x, const Vec3& f) {
+  const double r = g.point.r_m, c = g.point.cos_theta, s = g.point.sin_theta;
+  const double p = g.p, h = g.h;
+  const double e_cos_f = p / r - 1, e_sin_f = x.ex * s - x.ey * c;
+  const double normal = r * f.z / h;
+  const double turn = s * g.cos_i / g.sin_i * normal;  // the node's motion seen in the plane
+  return {2 * x.a_m * x.a_m / h * (e_sin_f * f.x + p / r * f.y),
+          (p * s * f.x + ((p + r) * c + r * x.ex) * f.y) / h + x.ey * turn,
+          (-p * c * f.x + ((p + r) * s + r * x.ey) * f.y) / h - x.ex * turn,
+          c * normal,
+          s * normal / g.sin_i,
+          g.n - 2 * r * g.eta * f.x / h - turn +
+              (-p * e_cos_f * f.x + (p + r) * e_sin_f * f.y) / (h * (1 + g.eta))};
+}
+
+bool is_flyable(const QuasiNonsingularElements& x) {
+  return x.a_m > 0 && std::isfinite(x.a_m) && x.ex * x.ex + x.ey * x.ey < 1 &&
+         std::isfinite(x.i_rad) && std::isfinite(x.raan_rad) && std::isfinite(x.u_rad) &&
+         std::sin(x.i_rad) > 1e-9;
+}
+
+}  // namespace
+
+PropagationError::PropagationError(const std::string& what, const OrbitState& state)
+    : std::runtime_error("propagation: " + what + "; last good state: " + describe(state)),
+      state_(state) {}
+
+struct OrbitDynamics::Evaluation {
+  InertialState state;
+  QuasiNonsingularElements rate;
+  Vec3 perturbation_ECI;
+};
+
+OrbitDynamics::OrbitDynamics(std::shared_ptr<const SpaceEnvironment> environment, Forces forces)
+    : environment_(std::move(environment)), forces_(std::move(forces)) {
+  if (environment_ == nullptr) throw std::invalid_argument("OrbitDynamics: no environment given");
+  for (const auto& force : forces_) {
+    if (force == nullptr) throw std::invalid_argument("OrbitDynamics: a force is null");
+  }
+}
+
+OrbitDynamics::Evaluation OrbitDynamics::evaluate(SimTime t, const QuasiNonsingularElements& x,
+                                                  double mass_kg, const Surroundings& around) const {
+  const Geometry g = geometry(x);
+  Evaluation e;
+  e.state = inertial_state_at(g, x);
+  const OrbitState orbit{t, e.state.r_ECI, e.state.v_ECI, mass_kg};
+  for (const auto& force : forces_) e.perturbation_ECI += force->acceleration_ECI(orbit, around);
+  const Vec3& f = e.perturbation_ECI;
+  e.rate = gauss(g, x, {dot(g.R_ECI, f), dot(g.T_ECI, f), dot(g.N_ECI, f)});
+  return e;
+}
+
+OrbitDynamics::State OrbitDynamics::completed(SimTime t, const QuasiNonsingularElements& x,
+                                              double mass_kg, const Surroundings& around) const {
+  const Evaluation e = evaluate(t, x, mass_kg, around);
+  const double r = norm(e.state.r_ECI);
+  return {{t, e.state.r_ECI, e.state.v_ECI, mass_kg},
+          x,
+          e.rate,
+          e.perturbation_ECI - kMuEarth_m3ps2 / (r * r * r) * e.state.r_ECI};
+}
+
+OrbitDynamics::State OrbitDynamics::start(const OrbitState& initial) const {
+  if (!(initial.mass_kg > 0)) {
+    throw std::invalid_argument("OrbitDynamics::start: mass_kg = " + std::to_string(initial.mass_kg) +
+                                "; accepted: above 0");
+  }
+  const QuasiNonsingularElements x = to_quasi_nonsingular(inertial_state(initial));
+  require_above_ground(x, "OrbitDynamics::start");
+  return completed(initial.t, x, initial.mass_kg, environment_->surroundings(initial.t));
+}
+
+OrbitDynamics::State OrbitDynamics::step(const State& from, SimTime to) const {
+  const Duration span = to - from.orbit.t;
+  const double dt_s = to_seconds(span), mass_kg = from.orbit.mass_kg;
+  const SimTime middle = from.orbit.t + span / 2;
+  const auto rate_at = [&](SimTime t, const QuasiNonsingularElements& x, const Surroundings& around) {
+    // Before the forces see it: a field need not converge below the ground.
+    if (!is_flyable(x)) throw PropagationError("the orbit is no longer an ellipse", from.orbit);
+    if (solve_kepler(x).r_m < kRadiusEarth_m)
+      throw PropagationError("the orbit went below the ground", from.orbit);
+    return evaluate(t, x, mass_kg, around).rate;
+  };
+  const Surroundings in_middle = environment_->surroundings(middle);
+  const Surroundings at_end = environment_->surroundings(to);
+  const QuasiNonsingularElements& x = from.elements;
+  const QuasiNonsingularElements& k1 = from.rate;
+  const QuasiNonsingularElements k2 = rate_at(middle, plus(x, dt_s / 2, k1), in_middle);
+  const QuasiNonsingularElements k3 = rate_at(middle, plus(x, dt_s / 2, k2), in_middle);
+  const QuasiNonsingularElements k4 = rate_at(to, plus(x, dt_s, k3), at_end);
+  QuasiNonsingularElements next = plus(x, dt_s / 6, weighted(k1, k2, k3, k4));
+  next.u_rad = unwound(next.u_rad);
+  if (!is_flyable(next)) throw PropagationError("the orbit is no longer an ellipse", from.orbit);
+  if (solve_kepler(next).r_m < kRadiusEarth_m)
+    throw PropagationError("the orbit went below the ground", from.orbit);
+  return completed(to, next, mass_kg, at_end);
+}
+
+OrbitDynamics::State OrbitDynamics::after_impulse(const State& at, const Vec3& dv_ECI) const {
+  if (!is_finite(dv_ECI)) throw std::domain_error("OrbitDynamics::after_impulse: dv_ECI is not finite");
+  const InertialState kicked{at.orbit.r_ECI, at.orbit.v_ECI + dv_ECI};
+  QuasiNonsingularElements x;
+  try {
+    x = to_quasi_nonsingular(kicked);
+  } catch (const std::invalid_argument& error) {
+    throw PropagationError(std::string("impulse: ") + error.what(), at.orbit);
+  }
+  State next = completed(at.orbit.t, x, at.orbit.mass_kg, environment_->surroundings(at.orbit.t));
+  // To the bit what the caller added: the detour over the elements rounds.
+  next.orbit.v_ECI = kicked.v_ECI;
+  next.orbit.r_ECI = kicked.r_ECI;
+  return next;
+}
+
+OrbitState OrbitDynamics::interpolate(const State& a, const State& b, SimTime t) {
+  const double h = to_seconds(b.orbit.t - a.orbit.t);
+  const double dt = to_seconds(t - a.orbit.t);
+  const double s = dt / h;
+  // r = r_a + v_a dt + a_a dt^2/2 + s^3 (c3 + c4 s + c5 s^2): the c match position, velocity and
+  // acceleration at b.
+  const Vec3 dr = b.orbit.r_ECI - a.orbit.r_ECI - h * a.orbit.v_ECI - (0.5 * h * h) * a.a_ECI;
+  const Vec3 dv = h * (b.orbit.v_ECI - a.orbit.v_ECI - h * a.a_ECI);
+  const Vec3 da = (h * h) * (b.a_ECI - a.a_ECI);
+  const Vec3 c3 = 10 * dr - 4 * dv + 0.5 * da;
+  const Vec3 c4 = -15 * dr + 7 * dv - da;
+  const Vec3 c5 = 6 * dr - 3 * dv + 0.5 * da;
+  const Vec3 r = a.orbit.r_ECI + dt * a.orbit.v_ECI + (0.5 * dt * dt) * a.a_ECI +
+                 (s * s * s) * (c3 + s * (c4 + s * c5));
+  const Vec3 v = a.orbit.v_ECI + dt * a.a_ECI + (s * s / h) * (3 * c3 + s * (4 * c4 + (5 * s) * c5));
+  return {t, r, v, a.orbit.mass_kg};
+}
+
+std::optional<SimTime> OrbitDynamics::next_discontinuity(SimTime t) const {
+  std::optional<SimTime> first;
+  for (const auto& force : forces_) {
+    const std::optional<SimTime> next = force->next_discontinuity(t);
+    if (next && (!first || *next < *first)) first = next;
+  }
+  return first;
+}
+
+}  // namespace orrery
