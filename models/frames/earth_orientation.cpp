@@ -1,8 +1,9 @@
+#include <orrery/models/frames/earth_orientation.hpp>
+#include <orrery/models/frames/time_scales.hpp>
+
 #include <erfa.h>
 
 #include <cmath>
-#include <orrery/models/frames/earth_orientation.hpp>
-#include <orrery/models/frames/time_scales.hpp>
 
 namespace orrery {
 namespace {
@@ -96,7 +97,7 @@ double EarthOrientation::gast(const Interval& in, SimTime t, double tau, double*
   double angle = in.gast_rad + kGmstRate_radps * kInterval_s * tau +
                  (q.c0 + tau * (q.c1 + tau * (q.c2 + tau * q.c3)));
   // UTC, and with it UT1, falls back by a second in mid-interval.
-  if (in.leap_second_inside) angle -= *rate * (orrery::leap_seconds(t) - in.leap_seconds);
+  if (in.leap_second_inside) angle -= kGmstRate_radps * (orrery::leap_seconds(t) - in.leap_seconds);
   return angle;
 }
 
@@ -112,7 +113,8 @@ EarthAttitude EarthOrientation::at(SimTime t) const {
     rate[i] = (q.c1 + tau * (2 * q.c2 + tau * 3 * q.c3)) / kInterval_s;
   }
   const Mat3 NP{{m[0], m[1], m[2]}, {m[3], m[4], m[5]}, {m[6], m[7], m[8]}};
-  const Mat3 NP_rate{{rate[0], rate[1], rate[2]}, {rate[3], rate[4], rate[5]}, {rate[6], rate[7], rate[8]}};
+  const Mat3 NP_rate{
+      {rate[0], rate[1], rate[2]}, {rate[3], rate[4], rate[5]}, {rate[6], rate[7], rate[8]}};
 
   double gast_rate = 0;
   const Mat3 spin = rotation_about_z(gast(in, t, tau, &gast_rate));

@@ -1,10 +1,11 @@
 /// Orientation of the Earth relative to ECI, cheap enough for every stage of an integrator.
 #pragma once
 
-#include <array>
-#include <mutex>
 #include <orrery/harness/kernel/time.hpp>
 #include <orrery/models/frames/vector.hpp>
+
+#include <array>
+#include <mutex>
 
 namespace orrery {
 
@@ -13,13 +14,16 @@ struct EarthAttitude {
   Vec3 omega_EI_ECEF;  // angular velocity of the Earth relative to ECI [rad/s]; derivative of R_EI
 };
 
-/// R_EI = R3(GAST) N P through ERFA: IAU 1976 precession, IAU 1980 nutation, GMST 1982 with the 1994
-/// equation of the equinoxes, UT1 = UTC (so it steps by 15" at a leap second), no polar motion.
+/// R_EI = R3(GAST) N P through ERFA: IAU 1976 precession, IAU 1980 nutation, GMST 1982 with the
+/// 1994 equation of the equinoxes, UT1 = UTC (so it steps by 15" at a leap second), no polar
+/// motion.
 ///
-/// Method   N P and GAST less its mean rate are cubics through ERFA's values at fixed instants 3 h apart
+/// Method   N P and GAST less its mean rate are cubics through ERFA's values at fixed instants 3 h
+/// apart
 ///          (both intervals beside the one asked for), so the result depends on t alone and not on
-///          what was asked before. The fastest nutation that counts, 0.23" at 13.7 d, bounds the
-///          interpolation error at (9/16)(h^4/24) max|f''''| = 3e-13 rad, 2 um at the Earth's surface.
+///          what was asked before. Interpolation
+///          error (9/16)(h^4/24) max|f''''|: 3e-13 rad from the nutation of 0.23" at 13.7 d, 4e-13
+///          rad in all, 3 um at the Earth's surface.
 /// Threads  Safe. The last few intervals are kept; two objects, or none kept, give the same bits.
 /// Checked  test_suites/validation/models/frames/earth_orientation_test.cpp
 class EarthOrientation {
@@ -42,11 +46,11 @@ class EarthOrientation {
   struct Interval {
     std::int64_t index = 0;
     bool valid = false;
-    int leap_seconds = 0;          // at its begin
+    int leap_seconds = 0;  // at its begin
     bool leap_second_inside = false;
-    double gast_rad = 0;           // at its begin
-    Cubic gast_residual;           // GAST - gast_rad - mean rate * (t - begin)
-    std::array<Cubic, 9> NP;       // row-major
+    double gast_rad = 0;      // at its begin
+    Cubic gast_residual;      // GAST - gast_rad - mean rate * (t - begin)
+    std::array<Cubic, 9> NP;  // row-major
   };
 
   static Interval make_interval(std::int64_t index);

@@ -1,7 +1,8 @@
+#include <orrery/models/frames/geodetic.hpp>
+
 #include <erfa.h>
 #include <erfam.h>
 
-#include <orrery/models/frames/geodetic.hpp>
 #include <stdexcept>
 #include <string>
 

@@ -1,4 +1,5 @@
 #include <orrery/models/frames/rtn.hpp>
+
 #include <stdexcept>
 
 namespace orrery {
@@ -7,7 +8,8 @@ Mat3 rtn_axes(const InertialState& chief) {
   const Vec3 R = unit(chief.r_ECI);
   const Vec3 N = unit(cross(chief.r_ECI, chief.v_ECI));
   if (!is_finite(R) || !is_finite(N)) {
-    throw std::domain_error("rtn_axes: r_ECI and v_ECI span no orbit plane (parallel, zero or not finite)");
+    throw std::domain_error(
+        "rtn_axes: r_ECI and v_ECI span no orbit plane (parallel, zero or not finite)");
   }
   return {R, cross(N, R), N};
 }

@@ -9,8 +9,8 @@ namespace orrery {
 /// @throws std::domain_error  r and v parallel, zero or not finite: there is no orbit plane.
 Mat3 rtn_axes(const InertialState& chief);
 
-/// Angular velocity of RTN relative to ECI in RTN [rad/s]: (0, 0, |r x v|/|r|^2), the osculating orbit's.
-/// What turns the plane adds r a_N/|r x v| along R, below 1e-6 rad/s in low Earth orbit.
+/// Angular velocity of RTN relative to ECI in RTN [rad/s]: (0, 0, |r x v|/|r|^2), the osculating
+/// orbit's. What turns the plane adds r a_N/|r x v| along R, below 1e-6 rad/s in low Earth orbit.
 Vec3 omega_HI_RTN(const InertialState& chief);
 
 struct RelativeState {

@@ -1,6 +1,7 @@
+#include <orrery/models/frames/time_scales.hpp>
+
 #include <erfa.h>
 
-#include <orrery/models/frames/time_scales.hpp>
 #include <stdexcept>
 #include <string>
 
@@ -31,8 +32,8 @@ int leap_seconds_on(const JulianDate& utc) {
     throw std::invalid_argument("leap_seconds: year " + std::to_string(year) +
                                 "; accepted: 1980 to 2200");
   }
-  // Status 1 says that the date is far beyond ERFA's release, where leap seconds may be missing: the
-  // simulated UTC then simply has none.
+  // Status 1 says that the date is far beyond ERFA's release, where leap seconds may be missing:
+  // the simulated UTC then simply has none.
   eraDat(year, month, day, fraction, &delta_s);
   return static_cast<int>(delta_s);
 }

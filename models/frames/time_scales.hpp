@@ -16,7 +16,8 @@ JulianDate gps_to_tt(SimTime t);
 /// Centuries of 36525 days TT from J2000.0.
 double gps_to_tt_centuries(SimTime t);
 
-/// TAI - UTC [s], from ERFA's table of leap seconds (eraDat). Throughout a leap second: the old value.
+/// TAI - UTC [s], from ERFA's table of leap seconds (eraDat). Throughout a leap second: the old
+/// value.
 /// @throws std::invalid_argument  before 1980 or beyond 2200.
 int leap_seconds(SimTime t);
 /// UTC = GPST + 19 s - (TAI - UTC). A leap second reads like the second after it.

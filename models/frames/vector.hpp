@@ -71,14 +71,23 @@ constexpr Mat3 operator*(const Mat3& a, const Mat3& b) {
   return {t * a.row_x, t * a.row_y, t * a.row_z};
 }
 
-/// Hamilton product, w first. q_BI turns inertial components into body components like R_BI.
+/// Hamilton product, w first. q_BI turns inertial components into body components like R_BI:
+/// f_B = q_BI f_ECI q_BI*, so that q_SI = q_SB * q_BI. For axes turned by +angle about z (R3) it is
+/// (cos(angle/2), 0, 0, -sin(angle/2)).
 struct Quaternion {
   double w = 1, x = 0, y = 0, z = 0;
   friend constexpr bool operator==(const Quaternion&, const Quaternion&) = default;
 };
 
+constexpr Quaternion operator*(const Quaternion& a, const Quaternion& b) {
+  return {
+      a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
+      a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
+}
+
 /// The unit quaternion with the same effect as the rotation matrix, w >= 0 (Shepperd's method).
 Quaternion to_quaternion(const Mat3& R_BA);
+/// @param q_BA  Of unit length.
 Mat3 to_matrix(const Quaternion& q_BA);
 
 }  // namespace orrery
