@@ -1,4 +1,5 @@
-/// Ideal pointing laws: attitude as an analytic function of the orbit, until attitude dynamics exists.
+/// Ideal pointing laws: attitude as an analytic function of the orbit, until attitude dynamics
+/// exists.
 #pragma once
 
 #include <orrery/models/frames/frames.hpp>
@@ -6,8 +7,8 @@
 namespace orrery {
 
 struct BodyAttitude {
-  Mat3 R_BI;         // f_B = R_BI f_ECI
-  Vec3 omega_BI_B;   // angular velocity of the body relative to ECI, in body axes [rad/s]
+  Mat3 R_BI;        // f_B = R_BI f_ECI
+  Vec3 omega_BI_B;  // angular velocity of the body relative to ECI, in body axes [rad/s]
 };
 
 /// Zenith mode: +Z up along the position, +X along track (T), +Y along the orbit normal (N).

@@ -1,5 +1,6 @@
-#include <cmath>
 #include <orrery/models/orbit/elements.hpp>
+
+#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -18,7 +19,8 @@ void require(bool ok, const char* where, const std::string& name, double value,
 }
 
 void require_ellipse(const QuasiNonsingularElements& x, const char* where) {
-  require(std::isfinite(x.a_m) && x.a_m > 0, where, "semi-major axis [m]", x.a_m, "above 0, finite");
+  require(std::isfinite(x.a_m) && x.a_m > 0, where, "semi-major axis [m]", x.a_m,
+          "above 0, finite");
   const double e = std::sqrt(x.ex * x.ex + x.ey * x.ey);
   require(e < 1, where, "eccentricity", e, "0 <= e < 1");
   require(x.i_rad >= 0 && x.i_rad <= kPi, where, "inclination [rad]", x.i_rad, "0 to pi");
@@ -103,8 +105,8 @@ QuasiNonsingularElements to_quasi_nonsingular(const KeplerianElements& k) {
 KeplerianElements to_keplerian(const QuasiNonsingularElements& x) {
   require_ellipse(x, "to_keplerian");
   const double omega = wrap_to_two_pi(std::atan2(x.ey, x.ex));
-  return {x.a_m, std::sqrt(x.ex * x.ex + x.ey * x.ey), x.i_rad, x.raan_rad, omega,
-          wrap_to_two_pi(x.u_rad - omega)};
+  return {x.a_m, std::sqrt(x.ex * x.ex + x.ey * x.ey), x.i_rad, x.raan_rad,
+          omega, wrap_to_two_pi(x.u_rad - omega)};
 }
 
 InertialState to_inertial(const QuasiNonsingularElements& e, double mu_m3ps2) {
@@ -138,9 +140,14 @@ QuasiNonsingularElements to_quasi_nonsingular(const InertialState& state, double
 
   const Vec3 e = cross(state.v_ECI, h) / mu_m3ps2 - state.r_ECI / r;
   const double ex = dot(e, node), ey = dot(e, ahead);
-  require(ex * ex + ey * ey < 1, kWhere, "eccentricity", std::sqrt(ex * ex + ey * ey), "0 <= e < 1");
+  require(ex * ex + ey * ey < 1, kWhere, "eccentricity", std::sqrt(ex * ex + ey * ey),
+          "0 <= e < 1");
   const double theta = std::atan2(dot(state.r_ECI, ahead), dot(state.r_ECI, node));
-  return {a, ex, ey, i, wrap_to_two_pi(std::atan2(node.y, node.x)),
+  return {a,
+          ex,
+          ey,
+          i,
+          wrap_to_two_pi(std::atan2(node.y, node.x)),
           wrap_to_two_pi(mean_argument(ex, ey, theta))};
 }
 
@@ -151,8 +158,8 @@ KeplerianElements to_keplerian(const InertialState& state, double mu_m3ps2) {
 void require_above_ground(const QuasiNonsingularElements& e, const char* where) {
   require_ellipse(e, where);
   const double perigee_m = e.a_m * (1 - std::sqrt(e.ex * e.ex + e.ey * e.ey));
-  require(perigee_m >= kRadiusEarth_m, where, "orbit below the ground: perigee radius [m]", perigee_m,
-          "at least " + std::to_string(kRadiusEarth_m) + " m");
+  require(perigee_m >= kRadiusEarth_m, where, "orbit below the ground: perigee radius [m]",
+          perigee_m, "at least " + std::to_string(kRadiusEarth_m) + " m");
 }
 
 }  // namespace orrery

@@ -17,7 +17,8 @@ struct KeplerianElements {
 };
 
 /// Regular for circular orbits, singular for equatorial ones. ex = e cos(omega), ey = e sin(omega),
-/// u = omega + M: the mean argument of latitude. Angles are not wrapped: a propagator may count turns.
+/// u = omega + M: the mean argument of latitude. Angles are not wrapped: a propagator may count
+/// turns.
 struct QuasiNonsingularElements {
   double a_m = 0;
   double ex = 0;
@@ -27,18 +28,20 @@ struct QuasiNonsingularElements {
   double u_rad = 0;
 };
 
-// Every function here throws std::invalid_argument with the value and the accepted range for elements
-// that are not finite, a <= 0, e >= 1 or i outside [0, pi].
+// Every function here throws std::invalid_argument with the value and the accepted range for
+// elements that are not finite, a <= 0, e >= 1 or i outside [0, pi].
 
 QuasiNonsingularElements to_quasi_nonsingular(const KeplerianElements& elements);
 /// omega and M in [0, 2 pi); omega = 0 for e = 0.
 KeplerianElements to_keplerian(const QuasiNonsingularElements& elements);
 
-InertialState to_inertial(const QuasiNonsingularElements& elements, double mu_m3ps2 = kMuEarth_m3ps2);
+InertialState to_inertial(const QuasiNonsingularElements& elements,
+                          double mu_m3ps2 = kMuEarth_m3ps2);
 InertialState to_inertial(const KeplerianElements& elements, double mu_m3ps2 = kMuEarth_m3ps2);
 
 /// i in (0, pi), raan and u in [0, 2 pi).
-/// @throws std::invalid_argument  not an ellipse (e >= 1), or an equatorial orbit (i within 1e-9 rad of
+/// @throws std::invalid_argument  not an ellipse (e >= 1), or an equatorial orbit (i within 1e-9
+/// rad of
 ///         0 or pi), whose node is undefined.
 QuasiNonsingularElements to_quasi_nonsingular(const InertialState& state,
                                               double mu_m3ps2 = kMuEarth_m3ps2);

@@ -1,15 +1,16 @@
+#include <orrery/models/orbit/gravity.hpp>
+
 #include <cmath>
 #include <cstring>
-#include <orrery/models/orbit/gravity.hpp>
 #include <stdexcept>
 
 // Notation, after Pines with normalised coefficients. With u = z/r, rho = R/r and
 //   A_nm(u) = d^m P_n/du^m, normalised, = s_nm p_nm(u), p_nm monic of degree n - m,
-// the potential is U = mu/r sum_n rho^n sum_m A_nm (C_nm r_m + S_nm i_m), r_m + i i_m = ((x + iy)/r)^m.
-// The recursion runs in b_nm = rho^(n-m) p_nm: b_mm = 1 and
+// the potential is U = mu/r sum_n rho^n sum_m A_nm (C_nm r_m + S_nm i_m), r_m + i i_m = ((x +
+// iy)/r)^m. The recursion runs in b_nm = rho^(n-m) p_nm: b_mm = 1 and
 //   b_nm = (rho u) b_(n-1)m - gamma_nm rho^2 b_(n-2)m,  gamma_nm = ((n-1)^2 - m^2)/((2n-1)(2n-3)),
-// so powers of rho need no array of their own, and dA_nm/du = (n - m) s_nm p_n(m+1) turns derivatives
-// into values of the next order.
+// so powers of rho need no array of their own, and dA_nm/du = (n - m) s_nm p_n(m+1) turns
+// derivatives into values of the next order.
 
 namespace orrery {
 namespace {

@@ -1,10 +1,11 @@
 /// Gravity of a rotating body by spherical harmonics.
 #pragma once
 
-#include <array>
 #include <orrery/harness/kernel/simulator_only.hpp>
 #include <orrery/models/frames/vector.hpp>
 #include <orrery/models/orbit/gravity_field.hpp>
+
+#include <array>
 #include <string>
 #include <vector>
 
@@ -12,11 +13,12 @@ namespace orrery {
 
 /// Acceleration of a GravityField.
 ///
-/// Method      Pines, AIAA J. 11(11) 1973: the gradient in direction cosines, without a singularity at
-///             the poles. Per order m a recursion over the degree n in monic polynomials of z/r, all
-///             normalisation and derivative factors folded into the coefficients once, at construction.
-///             Four orders run side by side, each summed on its own, so vectors of any width give the
-///             same bits.
+/// Method      Pines, AIAA J. 11(11) 1973: the gradient in direction cosines, without a singularity
+/// at
+///             the poles. Per order m a recursion over the degree n in monic polynomials of z/r,
+///             all normalisation and derivative factors folded into the coefficients once, at
+///             construction. Four orders run side by side, each summed on its own, so vectors of
+///             any width give the same bits.
 /// Frames      ECEF in, ECEF out. Rotating to ECI is the caller's step (gravity_force.hpp).
 /// Valid for   |r| at or above the reference radius; inside it the series need not converge.
 /// Threads     Immutable after construction; calls keep everything on the stack.
@@ -46,8 +48,8 @@ class HarmonicGravity {
   using Lanes = std::array<double, kLanes>;
   // What one degree n contributes to four orders.
   struct alignas(32) Row {
-    Lanes gamma;           // recursion: b_n = z b_(n-1) - gamma b_(n-2)
-    Lanes C, S;            // for the sums over this order
+    Lanes gamma;             // recursion: b_n = z b_(n-1) - gamma b_(n-2)
+    Lanes C, S;              // for the sums over this order
     Lanes C_below, S_below;  // order m - 1, for the derivative along z
   };
   struct OrderSums;

@@ -1,10 +1,11 @@
+#include <orrery/models/data/embedded_tables.hpp>
+#include <orrery/models/orbit/gravity_field.hpp>
+
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <fstream>
 #include <iterator>
-#include <orrery/models/data/embedded_tables.hpp>
-#include <orrery/models/orbit/gravity_field.hpp>
 #include <stdexcept>
 
 namespace orrery {
@@ -61,8 +62,8 @@ class GravityFieldReader {
 
  private:
   [[noreturn]] void fail(const std::string& what) const {
-    throw std::invalid_argument("GravityField: " + source_ + ", line " + std::to_string(line_number_) +
-                                ": " + what);
+    throw std::invalid_argument("GravityField: " + source_ + ", line " +
+                                std::to_string(line_number_) + ": " + what);
   }
 
   bool next_line(std::string_view& line) {
@@ -141,13 +142,15 @@ class GravityFieldReader {
            "; accepted: 0 <= m <= n <= " + std::to_string(announced_degree_));
     if (*n < 2 && (*C != (*n == 0 ? 1 : 0) || *S != 0))
       fail("degree " + std::to_string(*n) +
-           " must be C = 1 (degree 0) or 0 (degree 1): mu is the header's, the origin the centre of mass");
+           " must be C = 1 (degree 0) or 0 (degree 1): mu is the header's, the origin the centre "
+           "of mass");
     if (*n <= field_.degree_) store(*n, *m, *C, *S);
   }
 
   void store(int n, int m, double C, double S) {
     const std::size_t i = triangle_index(n, m);
-    if (seen_[i]) fail("n = " + std::to_string(n) + ", m = " + std::to_string(m) + " is given twice");
+    if (seen_[i])
+      fail("n = " + std::to_string(n) + ", m = " + std::to_string(m) + " is given twice");
     seen_[i] = true;
     field_.C_[i] = C;
     field_.S_[i] = S;
@@ -164,7 +167,8 @@ class GravityFieldReader {
 
   std::string what_is_missing(int n, int m) const {
     bool cut_short = true;
-    for (std::size_t i = triangle_index(n, m); i < seen_.size(); ++i) cut_short = cut_short && !seen_[i];
+    for (std::size_t i = triangle_index(n, m); i < seen_.size(); ++i)
+      cut_short = cut_short && !seen_[i];
     const std::string first = "n = " + std::to_string(n) + ", m = " + std::to_string(m);
     if (!cut_short) return first + " is missing";
     return "cut short: the file ends here after n = " + std::to_string(last_[0]) +
@@ -185,7 +189,8 @@ class GravityFieldReader {
 
 std::size_t GravityField::index_of(int n, int m) const {
   if (m < 0 || m > n || n > degree_) {
-    throw std::out_of_range("GravityField: n = " + std::to_string(n) + ", m = " + std::to_string(m) +
+    throw std::out_of_range("GravityField: n = " + std::to_string(n) +
+                            ", m = " + std::to_string(m) +
                             "; accepted: 0 <= m <= n <= " + std::to_string(degree_));
   }
   return triangle_index(n, m);

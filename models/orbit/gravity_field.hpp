@@ -1,19 +1,22 @@
 /// Coefficients of a body's gravity field, from the compiled-in model or from an ICGEM file.
 #pragma once
 
-#include <optional>
 #include <orrery/harness/kernel/simulator_only.hpp>
+
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace orrery {
 
-/// Fully normalised spherical harmonic coefficients with the mu and radius they were estimated with.
+/// Fully normalised spherical harmonic coefficients with the mu and radius they were estimated
+/// with.
 ///
-/// Format   ICGEM .gfc, static fields: a header up to `end_of_head`, then one line `gfc n m C S` per
-///          coefficient in any order (columns after S are ignored, Fortran exponents accepted). Degree
-///          0 and 1 may be left out; they are 1 and 0.
+/// Format   ICGEM .gfc, static fields: a header up to `end_of_head`, then one line `gfc n m C S`
+/// per
+///          coefficient in any order (columns after S are ignored, Fortran exponents accepted).
+///          Degree 0 and 1 may be left out; they are 1 and 0.
 /// Errors   Everything that does not read as a complete field throws std::invalid_argument with the
 ///          source's name and the line: a file cut short, a missing, repeated, malformed or
 ///          non-finite coefficient, an unnormalised or time-variable field.

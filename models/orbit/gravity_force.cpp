@@ -1,5 +1,6 @@
 #include <orrery/models/orbit/earth.hpp>
 #include <orrery/models/orbit/gravity_force.hpp>
+
 #include <stdexcept>
 
 namespace orrery {

@@ -1,16 +1,17 @@
 /// The Earth's gravity field as a force: everything besides the point mass.
 #pragma once
 
-#include <memory>
 #include <orrery/models/orbit/force_model.hpp>
 #include <orrery/models/orbit/gravity.hpp>
+
+#include <memory>
 
 namespace orrery {
 
 /// Turns the position to ECEF, sums the harmonics from degree 2, turns the acceleration back.
 ///
-/// A field with another mu than kMuEarth_m3ps2 also gives the difference of the central terms, so the
-/// propagator's point mass plus this force is always the whole field.
+/// A field with another mu than kMuEarth_m3ps2 also gives the difference of the central terms, so
+/// the propagator's point mass plus this force is always the whole field.
 class GravityForce final : public ForceModel {
  public:
   /// Several spacecraft may share one field. @throws std::invalid_argument  null.

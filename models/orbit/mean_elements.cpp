@@ -1,5 +1,6 @@
-#include <cmath>
 #include <orrery/models/orbit/mean_elements.hpp>
+
+#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -11,8 +12,12 @@ struct Dual {
   double value = 0;
   Vec3 slope;
 
-  friend Dual operator+(const Dual& a, const Dual& b) { return {a.value + b.value, a.slope + b.slope}; }
-  friend Dual operator-(const Dual& a, const Dual& b) { return {a.value - b.value, a.slope - b.slope}; }
+  friend Dual operator+(const Dual& a, const Dual& b) {
+    return {a.value + b.value, a.slope + b.slope};
+  }
+  friend Dual operator-(const Dual& a, const Dual& b) {
+    return {a.value - b.value, a.slope - b.slope};
+  }
   friend Dual operator*(const Dual& a, const Dual& b) {
     return {a.value * b.value, a.value * b.slope + b.value * a.slope};
   }
@@ -56,8 +61,8 @@ TrueArgument true_argument(const QuasiNonsingularElements& e) {
   return t;
 }
 
-// The generating function and its derivatives: S = (1/n) times the integral over M of the periodic part
-// of the J2 disturbing function R (positive: R = -H1).
+// The generating function and its derivatives: S = (1/n) times the integral over M of the periodic
+// part of the J2 disturbing function R (positive: R = -H1).
 struct Generator {
   double S, S_a, S_i;
   Vec3 S_ex_ey_u;
@@ -66,7 +71,8 @@ struct Generator {
 Generator generator(const QuasiNonsingularElements& e, const OblateBody& body) {
   const TrueArgument t = true_argument(e);
   const double si = std::sin(e.i_rad), ci = std::cos(e.i_rad);
-  // Equation of the centre plus e sin f; sin 2 theta + e sin(f + 2 omega) + (e/3) sin(3 f + 2 omega).
+  // Equation of the centre plus e sin f; sin 2 theta + e sin(f + 2 omega) + (e/3) sin(3 f + 2
+  // omega).
   const Dual A = t.minus_u + t.ex * t.sin - t.ey * t.cos;
   const Dual sin2 = 2.0 * (t.sin * t.cos), cos2 = t.cos * t.cos - t.sin * t.sin;
   const Dual sin3 = sin2 * t.cos + cos2 * t.sin, cos3 = cos2 * t.cos - sin2 * t.sin;
@@ -81,8 +87,8 @@ Generator generator(const QuasiNonsingularElements& e, const OblateBody& body) {
   return {S.value, -1.5 * S.value / e.a_m, S_i, S.slope};
 }
 
-// {element, S}: Lagrange's planetary equations in quasi-nonsingular elements with S as the disturbing
-// function. S does not depend on the node.
+// {element, S}: Lagrange's planetary equations in quasi-nonsingular elements with S as the
+// disturbing function. S does not depend on the node.
 QuasiNonsingularElements short_period(const QuasiNonsingularElements& e, const OblateBody& body) {
   const Generator g = generator(e, body);
   const double na = std::sqrt(body.mu_m3ps2 / e.a_m);
@@ -102,8 +108,8 @@ QuasiNonsingularElements short_period(const QuasiNonsingularElements& e, const O
 
 QuasiNonsingularElements plus(const QuasiNonsingularElements& x, double s,
                               const QuasiNonsingularElements& d) {
-  return {x.a_m + s * d.a_m,     x.ex + s * d.ex,           x.ey + s * d.ey,
-          x.i_rad + s * d.i_rad, x.raan_rad + s * d.raan_rad, x.u_rad + s * d.u_rad};
+  return {x.a_m + s * d.a_m,           x.ex + s * d.ex,      x.ey + s * d.ey, x.i_rad + s * d.i_rad,
+          x.raan_rad + s * d.raan_rad, x.u_rad + s * d.u_rad};
 }
 
 void require_usable(const QuasiNonsingularElements& e, const char* where) {
@@ -146,12 +152,8 @@ QuasiNonsingularElements propagate_secular(const QuasiNonsingularElements& mean,
   const SecularRates rate = secular_rates(mean, body);
   const double turn = rate.argument_of_perigee * dt_s;
   const double c = std::cos(turn), s = std::sin(turn);
-  return {mean.a_m,
-          c * mean.ex - s * mean.ey,
-          s * mean.ex + c * mean.ey,
-          mean.i_rad,
-          mean.raan_rad + rate.raan * dt_s,
-          mean.u_rad + rate.u * dt_s};
+  return {mean.a_m,   c * mean.ex - s * mean.ey,        s * mean.ex + c * mean.ey,
+          mean.i_rad, mean.raan_rad + rate.raan * dt_s, mean.u_rad + rate.u * dt_s};
 }
 
 }  // namespace orrery

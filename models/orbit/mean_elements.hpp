@@ -11,10 +11,12 @@ struct OblateBody {
   double J2 = kJ2Earth;
 };
 
-/// Method     First order in J2, exact in eccentricity and inclination: osculating = mean + {mean, S},
+/// Method     First order in J2, exact in eccentricity and inclination: osculating = mean + {mean,
+/// S},
 ///            with S the short-period generating function of Brouwer, AJ 64 (1959), and the Poisson
-///            brackets of the quasi-nonsingular elements, so nothing is singular at e = 0 (the purpose
-///            of Lyddane, AJ 68 (1963)). Long-period terms (J2^2/J2, J3) stay in the mean elements.
+///            brackets of the quasi-nonsingular elements, so nothing is singular at e = 0 (the
+///            purpose of Lyddane, AJ 68 (1963)). Long-period terms (J2^2/J2, J3) stay in the mean
+///            elements.
 /// Error      Second order: J2^2 a, some metres, nearly the same for two spacecraft side by side.
 /// Valid for  e below about 0.1, sin i not 0. Angles keep their count of turns.
 /// Checked by test_suites/validation/models/orbit/mean_elements_test.cpp

@@ -1,5 +1,6 @@
-#include <cmath>
 #include <orrery/models/orbit/orbit_dynamics.hpp>
+
+#include <cmath>
 #include <string>
 
 namespace orrery {
@@ -9,11 +10,12 @@ constexpr double kTwoPi = 6.283185307179586;
 
 QuasiNonsingularElements plus(const QuasiNonsingularElements& x, double s,
                               const QuasiNonsingularElements& d) {
-  return {x.a_m + s * d.a_m,     x.ex + s * d.ex,           x.ey + s * d.ey,
-          x.i_rad + s * d.i_rad, x.raan_rad + s * d.raan_rad, x.u_rad + s * d.u_rad};
+  return {x.a_m + s * d.a_m,           x.ex + s * d.ex,      x.ey + s * d.ey, x.i_rad + s * d.i_rad,
+          x.raan_rad + s * d.raan_rad, x.u_rad + s * d.u_rad};
 }
 
-QuasiNonsingularElements weighted(const QuasiNonsingularElements& k1, const QuasiNonsingularElements& k2,
+QuasiNonsingularElements weighted(const QuasiNonsingularElements& k1,
+                                  const QuasiNonsingularElements& k2,
                                   const QuasiNonsingularElements& k3,
                                   const QuasiNonsingularElements& k4) {
   QuasiNonsingularElements sum = plus(k1, 2, k2);
@@ -28,7 +30,8 @@ double unwound(double angle_rad) {
 
 std::string describe(const OrbitState& s) {
   const auto three = [](const Vec3& v) {
-    return "(" + std::to_string(v.x) + ", " + std::to_string(v.y) + ", " + std::to_string(v.z) + ")";
+    return "(" + std::to_string(v.x) + ", " + std::to_string(v.y) + ", " + std::to_string(v.z) +
+           ")";
   };
   return to_string(s.t) + ", r_ECI = " + three(s.r_ECI) + " m, v_ECI = " + three(s.v_ECI) + " m/s";
 }
@@ -61,12 +64,13 @@ Geometry geometry(const QuasiNonsingularElements& x) {
 InertialState inertial_state_at(const Geometry& g, const QuasiNonsingularElements& x) {
   const double c = g.point.cos_theta, s = g.point.sin_theta;
   const double mu_over_h = kMuEarth_m3ps2 / g.h;
-  return {g.point.r_m * g.R_ECI, mu_over_h * ((x.ex * s - x.ey * c) * g.R_ECI +
-                                              (1 + x.ex * c + x.ey * s) * g.T_ECI)};
+  return {g.point.r_m * g.R_ECI,
+          mu_over_h * ((x.ex * s - x.ey * c) * g.R_ECI + (1 + x.ex * c + x.ey * s) * g.T_ECI)};
 }
 
 // Battin's variational equations with (fR, fT, fN) the perturbing acceleration in RTN.
-QuasiNonsingularElements gauss(const Geometry& g, const QuasiNonsingularElements& x, const Vec3& f) {
+QuasiNonsingularElements gauss(const Geometry& g, const QuasiNonsingularElements& x,
+                               const Vec3& f) {
   const double r = g.point.r_m, c = g.point.cos_theta, s = g.point.sin_theta;
   const double p = g.p, h = g.h;
   const double e_cos_f = p / r - 1, e_sin_f = x.ex * s - x.ey * c;
@@ -108,7 +112,8 @@ OrbitDynamics::OrbitDynamics(std::shared_ptr<const SpaceEnvironment> environment
 }
 
 OrbitDynamics::Evaluation OrbitDynamics::evaluate(SimTime t, const QuasiNonsingularElements& x,
-                                                  double mass_kg, const Surroundings& around) const {
+                                                  double mass_kg,
+                                                  const Surroundings& around) const {
   const Geometry g = geometry(x);
   Evaluation e;
   e.state = inertial_state_at(g, x);
@@ -131,8 +136,8 @@ OrbitDynamics::State OrbitDynamics::completed(SimTime t, const QuasiNonsingularE
 
 OrbitDynamics::State OrbitDynamics::start(const OrbitState& initial) const {
   if (!(initial.mass_kg > 0)) {
-    throw std::invalid_argument("OrbitDynamics::start: mass_kg = " + std::to_string(initial.mass_kg) +
-                                "; accepted: above 0");
+    throw std::invalid_argument("OrbitDynamics::start: mass_kg = " +
+                                std::to_string(initial.mass_kg) + "; accepted: above 0");
   }
   const QuasiNonsingularElements x = to_quasi_nonsingular(inertial_state(initial));
   require_above_ground(x, "OrbitDynamics::start");
@@ -143,7 +148,8 @@ OrbitDynamics::State OrbitDynamics::step(const State& from, SimTime to) const {
   const Duration span = to - from.orbit.t;
   const double dt_s = to_seconds(span), mass_kg = from.orbit.mass_kg;
   const SimTime middle = from.orbit.t + span / 2;
-  const auto rate_at = [&](SimTime t, const QuasiNonsingularElements& x, const Surroundings& around) {
+  const auto rate_at = [&](SimTime t, const QuasiNonsingularElements& x,
+                           const Surroundings& around) {
     // Before the forces see it: a field need not converge below the ground.
     if (!is_flyable(x)) throw PropagationError("the orbit is no longer an ellipse", from.orbit);
     if (solve_kepler(x).r_m < kRadiusEarth_m)
@@ -166,7 +172,8 @@ OrbitDynamics::State OrbitDynamics::step(const State& from, SimTime to) const {
 }
 
 OrbitDynamics::State OrbitDynamics::after_impulse(const State& at, const Vec3& dv_ECI) const {
-  if (!is_finite(dv_ECI)) throw std::domain_error("OrbitDynamics::after_impulse: dv_ECI is not finite");
+  if (!is_finite(dv_ECI))
+    throw std::domain_error("OrbitDynamics::after_impulse: dv_ECI is not finite");
   const InertialState kicked{at.orbit.r_ECI, at.orbit.v_ECI + dv_ECI};
   QuasiNonsingularElements x;
   try {
@@ -195,7 +202,8 @@ OrbitState OrbitDynamics::interpolate(const State& a, const State& b, SimTime t)
   const Vec3 c5 = 6 * dr - 3 * dv + 0.5 * da;
   const Vec3 r = a.orbit.r_ECI + dt * a.orbit.v_ECI + (0.5 * dt * dt) * a.a_ECI +
                  (s * s * s) * (c3 + s * (c4 + s * c5));
-  const Vec3 v = a.orbit.v_ECI + dt * a.a_ECI + (s * s / h) * (3 * c3 + s * (4 * c4 + (5 * s) * c5));
+  const Vec3 v =
+      a.orbit.v_ECI + dt * a.a_ECI + (s * s / h) * (3 * c3 + s * (4 * c4 + (5 * s) * c5));
   return {t, r, v, a.orbit.mass_kg};
 }
 

@@ -1,11 +1,13 @@
-/// The equations of motion of one spacecraft and their integrator; spacecraft_orbit.hpp drives them.
+/// The equations of motion of one spacecraft and their integrator; spacecraft_orbit.hpp drives
+/// them.
 #pragma once
 
-#include <memory>
-#include <optional>
 #include <orrery/models/orbit/elements.hpp>
 #include <orrery/models/orbit/force_model.hpp>
 #include <orrery/models/orbit/space_environment.hpp>
+
+#include <memory>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
@@ -24,10 +26,11 @@ class PropagationError : public std::runtime_error {
 
 /// Gauss' variational equations in quasi-nonsingular elements, RK4.
 ///
-/// Method     x = (a, ex, ey, i, raan, u): Kepler's motion is exact whatever the step, so 10 s steps in
-///            a 60x60 field stay within a millimetre a day (Cartesian ones: half a metre). Equations:
-///            Battin, An Introduction to the Mathematics and Methods of Astrodynamics (1999), ch. 10, in
-///            nonsingular form. Four force evaluations a step.
+/// Method     x = (a, ex, ey, i, raan, u): Kepler's motion is exact whatever the step, so 10 s
+/// steps in
+///            a 60x60 field stay within a millimetre a day (Cartesian ones: half a metre).
+///            Equations: Battin, An Introduction to the Mathematics and Methods of Astrodynamics
+///            (1999), ch. 10, in nonsingular form. Four force evaluations a step.
 /// Frames     ECI throughout; forces as force_model.hpp says, the point mass by kMuEarth_m3ps2.
 /// Valid for  Ellipses above the ground, not within 1e-9 rad of equatorial.
 /// Checked by test_suites/validation/models/orbit/propagation_test.cpp
@@ -53,7 +56,8 @@ class OrbitDynamics {
   /// The velocity changed by dv_ECI at this instant.
   /// @throws std::domain_error  not finite. @throws PropagationError  no longer an ellipse.
   State after_impulse(const State& at, const Vec3& dv_ECI) const;
-  /// Quintic Hermite on position, velocity and acceleration, a.t <= t <= b.t. Error for 10 s: 1e-9 m.
+  /// Quintic Hermite on position, velocity and acceleration, a.t <= t <= b.t. Error for 10 s: 1e-9
+  /// m.
   static OrbitState interpolate(const State& a, const State& b, SimTime t);
   /// The first instant after `t` at which a force jumps.
   std::optional<SimTime> next_discontinuity(SimTime t) const;

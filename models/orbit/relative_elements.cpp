@@ -1,5 +1,6 @@
-#include <cmath>
 #include <orrery/models/orbit/relative_elements.hpp>
+
+#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -25,12 +26,10 @@ QuasiNonsingularElements deputy_elements(const QuasiNonsingularElements& chief,
                                 std::to_string(chief.i_rad) + " rad; accepted: not equatorial");
   }
   const double draan = relative.diy / sin_i;
-  const QuasiNonsingularElements deputy{chief.a_m * (1 + relative.da),
-                                        chief.ex + relative.dex,
-                                        chief.ey + relative.dey,
-                                        chief.i_rad + relative.dix,
-                                        chief.raan_rad + draan,
-                                        chief.u_rad + relative.dl - draan * std::cos(chief.i_rad)};
+  const QuasiNonsingularElements deputy{
+      chief.a_m * (1 + relative.da), chief.ex + relative.dex,
+      chief.ey + relative.dey,       chief.i_rad + relative.dix,
+      chief.raan_rad + draan,        chief.u_rad + relative.dl - draan * std::cos(chief.i_rad)};
   to_keplerian(deputy);  // for its checks
   return deputy;
 }

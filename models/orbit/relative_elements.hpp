@@ -21,7 +21,8 @@ struct RelativeElements {
   }
 };
 
-/// Differences of angles are taken to (-pi, pi] before anything else, wherever the two counts start.
+/// Differences of angles are taken to (-pi, pi] before anything else, wherever the two counts
+/// start.
 RelativeElements relative_elements(const QuasiNonsingularElements& chief,
                                    const QuasiNonsingularElements& deputy);
 

@@ -1,4 +1,5 @@
 #include <orrery/models/orbit/spacecraft_orbit.hpp>
+
 #include <stdexcept>
 #include <utility>
 
@@ -15,7 +16,8 @@ SpacecraftOrbit::SpacecraftOrbit(const OrbitState& initial, SpacecraftOrbitOptio
 }
 
 void SpacecraftOrbit::add_force(std::shared_ptr<const ForceModel> force) {
-  if (dynamics_ != nullptr) throw std::logic_error("SpacecraftOrbit::add_force: the orbit has started");
+  if (dynamics_ != nullptr)
+    throw std::logic_error("SpacecraftOrbit::add_force: the orbit has started");
   if (force == nullptr) throw std::invalid_argument("SpacecraftOrbit::add_force: null");
   options_.forces.push_back(std::move(force));
 }

@@ -1,9 +1,10 @@
 /// The truth orbit of one spacecraft: propagated only as far as somebody looks.
 #pragma once
 
-#include <memory>
 #include <orrery/harness/kernel/time.hpp>
 #include <orrery/models/orbit/orbit_dynamics.hpp>
+
+#include <memory>
 
 namespace orrery {
 
@@ -18,16 +19,17 @@ struct SpacecraftOrbitOptions {
 
 /// A lazily propagated continuous system.
 ///
-/// The grid is fixed by `step`, by the impulses and by the discontinuities of the forces. A look between
-/// two grid points is interpolated and leaves no trace: any pattern of looks gives the same orbit, to
-/// the bit. Instants run forward: the past beyond the last grid point is forgotten.
+/// The grid is fixed by `step`, by the impulses and by the discontinuities of the forces. A look
+/// between two grid points is interpolated and leaves no trace: any pattern of looks gives the same
+/// orbit, to the bit. Instants run forward: the past beyond the last grid point is forgotten.
 class SpacecraftOrbit {
  public:
-  /// @throws std::invalid_argument  an orbit below the ground or not an ellipse, mass <= 0, step <= 0,
+  /// @throws std::invalid_argument  an orbit below the ground or not an ellipse, mass <= 0, step <=
+  /// 0,
   ///                                no environment, a null force.
   SpacecraftOrbit(const OrbitState& initial, SpacecraftOrbitOptions options);
 
-  /// @throws std::logic_error  after the first look or impulse. @throws std::invalid_argument  null.
+  /// @throws std::logic_error  after the first look or impulse. @throws std::invalid_argument null.
   void add_force(std::shared_ptr<const ForceModel> force);
 
   /// The state at `t`, right-continuous at impulses.
@@ -40,9 +42,12 @@ class SpacecraftOrbit {
   void apply_impulse(SimTime t, const Vec3& dv_ECI);
 
   /// Osculating elements at `t`. Errors as at().
-  QuasiNonsingularElements elements_at(SimTime t) { return to_quasi_nonsingular(inertial_state(at(t))); }
+  QuasiNonsingularElements elements_at(SimTime t) {
+    return to_quasi_nonsingular(inertial_state(at(t)));
+  }
 
-  /// RK4 steps computed so far, those thrown away for an impulse included; looks between grid points.
+  /// RK4 steps computed so far, those thrown away for an impulse included; looks between grid
+  /// points.
   std::uint64_t steps() const { return steps_; }
   std::uint64_t interpolations() const { return interpolations_; }
 

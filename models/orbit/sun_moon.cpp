@@ -1,9 +1,10 @@
+#include <orrery/models/frames/time_scales.hpp>
+#include <orrery/models/orbit/sun_moon.hpp>
+
 #include <erfa.h>
 #include <erfam.h>
 
 #include <cmath>
-#include <orrery/models/frames/time_scales.hpp>
-#include <orrery/models/orbit/sun_moon.hpp>
 
 namespace orrery {
 namespace {
@@ -32,10 +33,10 @@ struct LunarArguments {
 };
 
 constexpr Term kLongitude_arcsec[] = {
-    {22640, 1, 0, 0, 0},  {769, 2, 0, 0, 0},    {-4586, 1, 0, 0, -2}, {2370, 0, 0, 0, 2},
-    {-668, 0, 1, 0, 0},   {-412, 0, 0, 2, 0},   {-212, 2, 0, 0, -2},  {-206, 1, 1, 0, -2},
-    {192, 1, 0, 0, 2},    {-165, 0, 1, 0, -2},  {148, 1, -1, 0, 0},   {-125, 0, 0, 0, 1},
-    {-110, 1, 1, 0, 0},   {-55, 0, 0, 2, -2}};
+    {22640, 1, 0, 0, 0}, {769, 2, 0, 0, 0},   {-4586, 1, 0, 0, -2}, {2370, 0, 0, 0, 2},
+    {-668, 0, 1, 0, 0},  {-412, 0, 0, 2, 0},  {-212, 2, 0, 0, -2},  {-206, 1, 1, 0, -2},
+    {192, 1, 0, 0, 2},   {-165, 0, 1, 0, -2}, {148, 1, -1, 0, 0},   {-125, 0, 0, 0, 1},
+    {-110, 1, 1, 0, 0},  {-55, 0, 0, 2, -2}};
 constexpr Term kLatitude_arcsec[] = {{-526, 0, 0, 1, -2}, {44, 1, 0, 1, -2},  {-31, -1, 0, 1, -2},
                                      {-25, -2, 0, 1, 0},  {-23, 0, 1, 1, -2}, {21, -1, 0, 1, 0},
                                      {11, 0, -1, 1, -2}};
@@ -56,14 +57,16 @@ Vec3 sun_position_ECI(double T) {
 Vec3 moon_position_ECI(double T) {
   // The last term refers the longitude to the equinox of J2000.
   const double L0 = (218.31617 + 481267.88088 * T - 1.3972 * T) * kDeg;
-  const LunarArguments a{(134.96292 + 477198.86753 * T) * kDeg, (357.52543 + 35999.04944 * T) * kDeg,
-                         (93.27283 + 483202.01873 * T) * kDeg, (297.85027 + 445267.11135 * T) * kDeg};
+  const LunarArguments a{(134.96292 + 477198.86753 * T) * kDeg,
+                         (357.52543 + 35999.04944 * T) * kDeg, (93.27283 + 483202.01873 * T) * kDeg,
+                         (297.85027 + 445267.11135 * T) * kDeg};
   double longitude = 0, latitude = 0, distance_km = 385000;
   for (const Term& k : kLongitude_arcsec) longitude += k.amplitude * std::sin(a.of(k));
   for (const Term& k : kLatitude_arcsec) latitude += k.amplitude * std::sin(a.of(k));
   for (const Term& k : kDistance_km) distance_km += k.amplitude * std::cos(a.of(k));
-  latitude += 18520 * std::sin(a.F + (longitude + 412 * std::sin(2 * a.F) + 541 * std::sin(a.l_sun)) *
-                                         kArcsec);
+  latitude +=
+      18520 *
+      std::sin(a.F + (longitude + 412 * std::sin(2 * a.F) + 541 * std::sin(a.l_sun)) * kArcsec);
   return equatorial(L0 + longitude * kArcsec, latitude * kArcsec, distance_km * 1e3);
 }
 
@@ -84,8 +87,8 @@ Vec3 apparent_sun_direction_ECI(SimTime t) {
   const Vec3 natural = r_sun_au / distance_au;
 
   constexpr double kLightTime_day_per_au = ERFA_AULT / ERFA_DAYSEC;
-  const Vec3 beta = kLightTime_day_per_au *
-                    Vec3{barycentric[1][0], barycentric[1][1], barycentric[1][2]};
+  const Vec3 beta =
+      kLightTime_day_per_au * Vec3{barycentric[1][0], barycentric[1][1], barycentric[1][2]};
   double pnat[3] = {natural.x, natural.y, natural.z}, v[3] = {beta.x, beta.y, beta.z}, seen[3];
   eraAb(pnat, v, distance_au, std::sqrt(1 - dot(beta, beta)), seen);
   return {seen[0], seen[1], seen[2]};
