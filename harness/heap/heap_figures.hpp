@@ -1,8 +1,9 @@
 /// What a simulated heap can say about itself.
 #pragma once
 
-#include <cstdint>
 #include <orrery/harness/kernel/simulator_only.hpp>
+
+#include <cstdint>
 
 namespace orrery {
 

@@ -1,0 +1,36 @@
+/// The seam between orrery::allocator, which replaces malloc in a test program, and the harness.
+#pragma once
+
+#include <orrery/harness/kernel/simulator_only.hpp>
+
+#include <cstdint>
+#include <string>
+
+namespace orrery {
+
+/// What the C library and the loader keep must not lie in the heap of the spacecraft that happened
+/// to make them need it: stdout's buffer, time zone, locale, the exception machinery. Once per
+/// program, before the first call into flight code; more calls do nothing.
+void warm_up_libraries();
+
+/// Self-test of the allocator's hooks: empty, or a message naming those that shared libraries of
+/// this program do not reach. Also empty where heaps are not simulated.
+std::string verify_interposition();
+
+namespace internal {
+
+/// The dynamic loader's code. What it allocates (thread-local storage of a library, say) outlives
+/// the process in whose call it does so.
+extern std::uintptr_t loader_begin, loader_bytes;
+
+/// What flight code must not do to the test program; set once by harness/flight.
+struct ProcessHooks {
+  /// True: the running process keeps it, and runs it at its own end.
+  bool (*register_exit)(void (*function)(void*), void* argument);
+  /// Returns if no flight code is running.
+  void (*exit)(int status);
+};
+extern const ProcessHooks* process_hooks;
+
+}  // namespace internal
+}  // namespace orrery
