@@ -1,0 +1,114 @@
+/// Estimates where the deputy is relative to the chief, from GNSS fixes of both.
+///
+/// State       a_roe [m] of the deputy (mean elements), and the chief's own mean orbit, each a
+/// Gaussian. Dynamics    J2 state transition; noise of the relative (and absolute) acceleration,
+/// white; own burns
+///             enter at mid-burn through the control input matrix, with an execution error.
+/// Measurement Both fixes of one epoch become mean elements; their difference measures a_roe
+/// directly.
+///             What the two share (Earth orientation, lever arm, broadcast orbits) cancels.
+/// Lateness    The filter stays `lag_s` behind and takes measurements in the order of their epochs,
+/// so
+///             messages that overtake each other on the way do not matter. Its answer for the
+///             present is the filtered state moved forward over burns and drift.
+/// Trust       An update whose innovation is impossible is left out. Three in a row mean that the
+/// state
+///             is wrong: first a burn that did not happen (or not fully) is suspected and the
+///             covariance opened in the direction of its effect, then everything.
+/// Memory      Fixed arrays; no allocation.
+/// Checked by  test_suites/unit/flight_sw/relative_navigation_test.cpp
+#pragma once
+
+#include <cstdint>
+
+#include "bestxyz_parser.hpp"
+#include "gaussian.hpp"
+
+namespace formation_keeping {
+
+struct NavigationOptions {
+  EarthTime earth_time;
+  double lag_s = 30.0;  ///< log-normal delay of median 1 s: 5e-6 of the messages are later
+  double pairing_tolerance_s = 6.0;  ///< own fix and chief's fix may be this far apart
+  /// Root power spectral density of the acceleration that the J2 model leaves out [m/s^1.5].
+  double relative_noise_mps15 = 1.5e-7;
+  double absolute_noise_mps15 = 3e-4;
+  double burn_error_fraction = 0.02;  ///< 1-sigma per axis, of the commanded delta-v
+  double gate = 33.0;                 ///< see measure()
+};
+
+/// A burn as commanded: middle of it, and delta-v in the deputy's RTN at that instant.
+struct Burn {
+  std::int64_t t_ns = 0;
+  flight_support::Vec3 dv_RTN;
+};
+
+/// The estimate at one instant.
+struct FormationState {
+  std::int64_t t_ns = 0;
+  OrbitElements chief;                ///< mean
+  Matrix6 chief_covariance;           ///< of the chief as relative_elements() to the truth [m^2]
+  Gaussian relative;                  ///< a_roe [m]
+  RelativeElements last_burn_effect;  ///< what the last burn changed in a_roe, by now [m]
+};
+
+class RelativeNavigation {
+ public:
+  explicit RelativeNavigation(const NavigationOptions& options) : options_(options) {}
+
+  /// Takes a fix of this spacecraft. @return false if it is no newer than the last one.
+  bool add_own_fix(const GnssFix& fix);
+  /// Takes a fix of the chief, in any order.
+  /// @return false if it is too old to be of use, or has been taken before.
+  bool add_chief_fix(const GnssFix& fix);
+  /// Notes a commanded burn, in the future or in the recent past.
+  void add_burn(const Burn& burn);
+  /// Works off the measurements that are `lag_s` old at `now_ns`.
+  void process(std::int64_t now_ns);
+
+  bool has_started() const { return started_; }
+  /// The state at `t_ns`, with known burns up to then. Requires has_started(), t_ns >= epoch_ns().
+  FormationState at(std::int64_t t_ns) const;
+  /// Epoch of the last measurement used.
+  std::int64_t epoch_ns() const { return state_.t_ns; }
+
+  std::uint32_t updates() const { return updates_; }
+  std::uint32_t outliers() const { return outliers_; }
+
+ private:
+  static constexpr int kOwnFixes = 64;  // a minute at 1 Hz
+  static constexpr int kChiefFixes = 16;
+  static constexpr int kBurns = 8;
+
+  struct TimedElements {
+    std::int64_t t_ns = 0;
+    OrbitElements mean;
+    double sigma_r_m = 0.0, sigma_v_mps = 0.0;
+  };
+
+  TimedElements mean_of(const GnssFix& fix) const;
+  const TimedElements* nearest_own(std::int64_t t_ns) const;
+  void take_oldest_chief_fix();
+  void update(const TimedElements& chief, const TimedElements& own);
+  void start(const TimedElements& chief, const RelativeElements& z, const Matrix6& R);
+  void measure_relative(const RelativeElements& z, const Matrix6& R, double u_rad, double n_radps);
+  void advance(FormationState* state, std::int64_t t_ns) const;
+  void coast(FormationState* state, std::int64_t t_ns) const;
+  void apply(FormationState* state, const Burn& burn) const;
+  void forget_burns_before(std::int64_t t_ns);
+
+  NavigationOptions options_;
+  TimedElements own_[kOwnFixes];  // ring
+  int own_count_ = 0, own_newest_ = -1;
+  TimedElements chief_[kChiefFixes];  // by ascending epoch
+  int chief_count_ = 0;
+  Burn burns_[kBurns];  // by ascending time, those after state_.t_ns
+  int burn_count_ = 0;
+  bool started_ = false;
+  FormationState state_;
+  int outliers_in_a_row_ = 0;
+  bool burn_suspected_ = false;
+  std::uint32_t updates_ = 0, outliers_ = 0;
+};
+
+}  // namespace formation_keeping
