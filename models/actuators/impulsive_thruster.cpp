@@ -1,3 +1,4 @@
+#include <orrery/harness/kernel/text.hpp>
 #include <orrery/models/actuators/impulsive_thruster.hpp>
 
 #include <stdexcept>
@@ -26,18 +27,17 @@ Command decode(Bytes message) {
 
 ImpulsiveThruster::ImpulsiveThruster(const Options& options) : options_(options) {
   if (options.minimum_lead < 0ns) {
-    throw std::invalid_argument(
-        "ImpulsiveThruster: minimum_lead = " + std::to_string(to_ns(options.minimum_lead)) +
-        " ns; accepted: 0 ns or more");
+    throw std::invalid_argument("ImpulsiveThruster: minimum_lead = " +
+                                to_string(options.minimum_lead) + "; accepted: 0 s or more");
   }
   if (options.maximum_lead < options.minimum_lead || options.maximum_lead > weeks(52)) {
     throw std::invalid_argument(
-        "ImpulsiveThruster: maximum_lead = " + std::to_string(to_ns(options.maximum_lead)) +
-        " ns; accepted: minimum_lead to 52 weeks");
+        "ImpulsiveThruster: maximum_lead = " + to_string(options.maximum_lead) +
+        "; accepted: minimum_lead to 52 weeks");
   }
   if (!(options.maximum_dv_mps > 0 && options.maximum_dv_mps <= 1e4)) {
     throw std::invalid_argument(
-        "ImpulsiveThruster: maximum_dv_mps = " + std::to_string(options.maximum_dv_mps) +
+        "ImpulsiveThruster: maximum_dv_mps = " + to_text(options.maximum_dv_mps) +
         " m/s; accepted: above 0, to 10000 m/s");
   }
 }
@@ -50,8 +50,8 @@ void ImpulsiveThruster::from_flight(DeviceContext& io, Bytes bytes) {
   const Command command = decode(bytes);
   // Written so that NaN fails.
   if (!(norm(command.dv_ECI) <= options_.maximum_dv_mps)) {
-    return reject(io, "delta-v of " + std::to_string(norm(command.dv_ECI)) +
-                          " m/s; accepted: 0 to " + std::to_string(options_.maximum_dv_mps));
+    return reject(io, "delta-v of " + to_text(norm(command.dv_ECI)) + " m/s; accepted: 0 to " +
+                          to_text(options_.maximum_dv_mps));
   }
   // The epoch may be any number: it is compared before it is subtracted.
   const std::int64_t earliest_ns = io.onboard_ns() + to_ns(options_.minimum_lead);

@@ -1,3 +1,4 @@
+#include <orrery/harness/kernel/text.hpp>
 #include <orrery/models/gnss/novatel.hpp>
 #include <orrery/models/gnss/receiver.hpp>
 
@@ -18,24 +19,23 @@ constexpr std::uint8_t kGpsL1 = 0x01;
 
 void check_period(Duration period) {
   if (period < kShortestPeriod || period > kLongestPeriod || period % 1ms != 0ns) {
-    throw std::invalid_argument("GnssReceiver: period = " + std::to_string(to_ns(period)) +
-                                " ns; accepted: whole milliseconds from 100 ms to 60 s");
+    throw std::invalid_argument("GnssReceiver: period = " + to_string(period) +
+                                "; accepted: whole milliseconds from 100 ms to 60 s");
   }
 }
 
 // Written so that NaN fails.
 void check_sigma(const char* option, double value, double largest) {
   if (!(value >= 0 && value <= largest)) {
-    throw std::invalid_argument("GnssReceiver: " + std::string(option) + " = " +
-                                std::to_string(value) + "; accepted: 0 to " +
-                                std::to_string(largest));
+    throw std::invalid_argument("GnssReceiver: " + std::string(option) + " = " + to_text(value) +
+                                "; accepted: 0 to " + to_text(largest));
   }
 }
 
 void check_lever_arm(const Vec3& lever_arm_B) {
   if (!(norm(lever_arm_B) <= kLongestLeverArm_m)) {
-    throw std::invalid_argument("GnssReceiver: |lever_arm_B| = " +
-                                std::to_string(norm(lever_arm_B)) + " m; accepted: 0 to 100 m");
+    throw std::invalid_argument("GnssReceiver: |lever_arm_B| = " + to_text(norm(lever_arm_B)) +
+                                " m; accepted: 0 to 100 m");
   }
 }
 

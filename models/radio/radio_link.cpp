@@ -1,3 +1,4 @@
+#include <orrery/harness/kernel/text.hpp>
 #include <orrery/models/radio/radio_link.hpp>
 
 #include <algorithm>
@@ -16,9 +17,8 @@ constexpr double kLowestMu = -20, kHighestMu = 10, kHighestSigma = 1.5;
 // Written so that NaN fails.
 void check(const char* option, double value, double low, double high) {
   if (!(value >= low && value <= high)) {
-    throw std::invalid_argument("RadioLink: " + std::string(option) + " = " +
-                                std::to_string(value) + "; accepted: " + std::to_string(low) +
-                                " to " + std::to_string(high));
+    throw std::invalid_argument("RadioLink: " + std::string(option) + " = " + to_text(value) +
+                                "; accepted: " + to_text(low) + " to " + to_text(high));
   }
 }
 
@@ -28,9 +28,8 @@ const RadioLinkOptions& checked(const RadioLinkOptions& options) {
   check("p_on", options.p_on, 0, 1);
   check("p_off", options.p_off, 0, 1);
   if (options.minimum_delay < 0ns) {
-    throw std::invalid_argument(
-        "RadioLink: minimum_delay = " + std::to_string(to_ns(options.minimum_delay)) +
-        " ns; accepted: 0 ns or more");
+    throw std::invalid_argument("RadioLink: minimum_delay = " + to_string(options.minimum_delay) +
+                                "; accepted: 0 s or more");
   }
   return options;
 }
@@ -44,9 +43,9 @@ RandomStream& stream(RandomStreams& streams, std::string_view from, std::string_
 
 LogNormalDelay log_normal_delay(double low_s, double high_s, double k) {
   if (!(low_s > 0 && high_s >= low_s && std::isfinite(high_s) && k > 0)) {
-    throw std::invalid_argument("log_normal_delay: low_s = " + std::to_string(low_s) +
-                                ", high_s = " + std::to_string(high_s) + ", k = " +
-                                std::to_string(k) + "; accepted: 0 < low_s <= high_s, k > 0");
+    throw std::invalid_argument("log_normal_delay: low_s = " + to_text(low_s) +
+                                ", high_s = " + to_text(high_s) + ", k = " + to_text(k) +
+                                "; accepted: 0 < low_s <= high_s, k > 0");
   }
   const double ln_low = std::log(low_s);
   const double ln_high = std::log(high_s);
