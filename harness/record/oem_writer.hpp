@@ -1,0 +1,60 @@
+/// Trajectories as CCSDS Orbit Ephemeris Messages, version 2.0, key-value notation.
+#pragma once
+
+#include <orrery/harness/kernel/time.hpp>
+#include <orrery/harness/record/output_file.hpp>
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace orrery {
+
+struct OemObject {
+  std::string name;  // OBJECT_NAME
+  std::string id;    // OBJECT_ID, "YYYY-NNNP" for a catalogued object; empty: the name again
+};
+
+/// Writes states as they come; nothing is kept in memory.
+///
+/// Format  CCSDS 502.0-B-2 (2009), chapter 5. EME2000 about the Earth's centre, TIME_SYSTEM GPS,
+///         km and km/s with 10 and 13 decimals (0.1 um, 0.1 nm/s): the standard allows 16 digits,
+///         too few for a double; the CSV beside it has them all.
+/// Bytes   depend on the arguments alone: CREATION_DATE is the run's epoch, not the wall clock.
+class OemWriter {
+ public:
+  using Components = std::array<double, 3>;  // x, y, z
+
+  /// @throws std::invalid_argument  a name that is empty or not printable ASCII.
+  ///         std::runtime_error     the file cannot be written.
+  OemWriter(const std::filesystem::path& path, const OemObject& object, SimTime epoch);
+
+  /// Adds a state, metres and m/s.
+  /// @throws std::invalid_argument  a component not finite, or above 99999 km or 99 km/s; t not
+  ///                                after the last state of this segment.
+  void state(SimTime t, const Components& r_ECI, const Components& v_ECI);
+
+  /// The next state begins a segment of its own, and may have the time of the last one. For
+  /// impulses: a reader must not interpolate across one.
+  void break_segment() { in_segment_ = false; }
+
+  /// @throws std::logic_error    no state was written: an OEM without one is not valid.
+  ///         std::runtime_error  the rest cannot be written.
+  void close();
+
+ private:
+  void begin_segment(SimTime t);
+  void end_segment();
+  void check(SimTime t, const Components& r_ECI, const Components& v_ECI) const;
+
+  OutputFile file_;
+  OemObject object_;
+  std::string line_;  // kept, so that a state costs no allocation
+  bool in_segment_ = false;
+  std::optional<SimTime> last_;           // time of the last state written
+  std::uint64_t stop_time_position_ = 0;  // of the last segment's STOP_TIME in the file
+};
+
+}  // namespace orrery

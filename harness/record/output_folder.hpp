@@ -1,0 +1,47 @@
+/// The folder of one test's files: there complete, or not at all.
+#pragma once
+
+#include <orrery/harness/kernel/simulator_only.hpp>
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace orrery {
+
+/// `root/<Suite>.<Test>/seed-<N>`, with `.rep<k>` after it for repetition k >= 1.
+///
+/// Files are written to a hidden folder beside it, which close() puts in its place: a reader sees
+/// the earlier run's folder or this one's, never a mixture. What a killed run left is removed by
+/// the next run of the same name.
+class OutputFolder {
+ public:
+  /// Creates the folders. `test`: "Suite.Test"; '/' in it becomes '-'.
+  /// @throws std::invalid_argument  `test` empty, beginning with '.', or holding a backslash or
+  ///                                a control character; repetition < 0.
+  ///         std::runtime_error     a folder cannot be created; the message names it.
+  OutputFolder(const std::filesystem::path& root, std::string_view test, std::uint64_t seed,
+               int repetition = 0);
+  /// Without close() nothing remains of what was written.
+  ~OutputFolder();
+  OutputFolder(const OutputFolder&) = delete;
+  OutputFolder& operator=(const OutputFolder&) = delete;
+
+  /// Where to write the file of that relative path ("truth/dsc.csv"); its folder is created.
+  /// @throws std::invalid_argument  an absolute path or one that leads outside.
+  ///         std::logic_error       after close(). std::runtime_error  as above.
+  std::filesystem::path file(const std::filesystem::path& relative) const;
+
+  /// Where the files are once closed.
+  const std::filesystem::path& path() const { return path_; }
+
+  /// Files must be closed before. @throws std::runtime_error  the folder cannot be put in place.
+  void close();
+
+ private:
+  std::filesystem::path path_, partial_;
+  bool closed_ = false;
+};
+
+}  // namespace orrery
