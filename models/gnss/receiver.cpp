@@ -1,4 +1,5 @@
 #include <orrery/harness/kernel/text.hpp>
+#include <orrery/models/frames/frames.hpp>
 #include <orrery/models/gnss/novatel.hpp>
 #include <orrery/models/gnss/receiver.hpp>
 
@@ -44,13 +45,9 @@ Duration until_next_epoch(SimTime now, Duration period) {
   return since_epoch == 0ns ? 0ns : period - since_epoch;
 }
 
-Vec3 antenna_position_ECEF(const OrbitState& body, const Mat3& R_BI, const Mat3& R_EI,
-                           const Vec3& lever_arm_B) {
-  return R_EI * (body.r_ECI + transpose(R_BI) * lever_arm_B);
-}
-
-Vec3 velocity_in_rotating_frame(const Vec3& v_ECI, const Vec3& r_ECEF, const Surroundings& around) {
-  return around.R_EI * v_ECI - cross(around.omega_EI_ECEF, r_ECEF);
+// Centre of mass to antenna; the body is taken as not turning (receiver.hpp).
+InertialState antenna_state(const OrbitState& body, const Mat3& R_BI, const Vec3& lever_arm_B) {
+  return {body.r_ECI + transpose(R_BI) * lever_arm_B, body.v_ECI};
 }
 
 // One draw per statement: the order of arguments is the compiler's.
@@ -81,16 +78,16 @@ void GnssReceiver::measure(DeviceContext& io) {
   const Vec3 noise_v = white_noise(io.random("velocity_noise"), options_.sigma_velocity_mps);
   if (io.fault("outage", 0.0) != 0.0) return;
 
-  const OrbitState body = io.truth();
   const Surroundings around = io.surroundings();
-  const Vec3 r_ECEF = antenna_position_ECEF(body, io.R_BI(), around.R_EI, options_.lever_arm_B);
-  const Vec3 v_ECEF = velocity_in_rotating_frame(body.v_ECI, r_ECEF, around);
+  const EarthFixedState antenna =
+      to_earth_fixed(antenna_state(io.truth(), io.R_BI(), options_.lever_arm_B), around.R_EI,
+                     around.omega_EI_ECEF);
 
   const double sigma_r = options_.sigma_position_m;
   const double sigma_v = options_.sigma_velocity_mps;
-  const novatel::BestXyz message{.r_ECEF = r_ECEF + noise_r,
+  const novatel::BestXyz message{.r_ECEF = antenna.r_ECEF + noise_r,
                                  .sigma_r_ECEF = {sigma_r, sigma_r, sigma_r},
-                                 .v_ECEF = v_ECEF + noise_v,
+                                 .v_ECEF = antenna.v_ECEF + noise_v,
                                  .sigma_v_ECEF = {sigma_v, sigma_v, sigma_v},
                                  .satellites_tracked = kChannels,
                                  .satellites_used = kChannels,
