@@ -10,8 +10,8 @@ namespace orrery {
 
 /// Delay whose logarithm is normal: ln(delay / 1 s) ~ N(mu, sigma^2).
 struct LogNormalDelay {
-  double mu = 0;                              // ln of the median in seconds, -20 to 10
-  double sigma = 0.767528364331348561340648;  // 0 to 1.5; default: ln(10)/3
+  double mu = 0;                      // ln of the median in seconds, -20 to 10
+  double sigma = 0.7675283643313486;  // 0 to 1.5; default: ln(10)/3
 };
 
 /// The log-normal delay that has `low_s` at -k sigma and `high_s` at +k sigma. The default of a
