@@ -27,7 +27,7 @@ std::string_view take_word(std::string_view& line) {
 }
 
 template <class Number>
-std::optional<Number> whole_number_in(std::string_view word) {
+std::optional<Number> number_in(std::string_view word) {
   Number value{};
   if (!word.empty() && word.front() == '+') word.remove_prefix(1);
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
@@ -37,11 +37,14 @@ std::optional<Number> whole_number_in(std::string_view word) {
 
 // Fortran writes 1.0D-10. from_chars also reads "nan" and "inf", which no coefficient may be.
 std::optional<double> real_in(std::string_view word) {
-  std::string text(word);
-  for (char& c : text) {
-    if (c == 'D' || c == 'd') c = 'E';
+  const std::size_t exponent = word.find_first_of("Dd");
+  std::string c_style;
+  if (exponent != std::string_view::npos) {
+    c_style = word;
+    c_style[exponent] = 'E';
+    word = c_style;
   }
-  const std::optional<double> value = whole_number_in<double>(text);
+  const std::optional<double> value = number_in<double>(word);
   return value && std::isfinite(*value) ? value : std::nullopt;
 }
 
@@ -93,7 +96,7 @@ class GravityFieldReader {
     if (keyword == "earth_gravity_constant" || keyword == "gravity_constant")
       field_.mu_m3ps2_ = positive(keyword, value);
     if (keyword == "radius") field_.radius_m_ = positive(keyword, value);
-    if (keyword == "max_degree") announced_degree_ = whole_number_in<int>(value).value_or(-1);
+    if (keyword == "max_degree") announced_degree_ = number_in<int>(value).value_or(-1);
     if (keyword == "norm" && value != "fully_normalized")
       fail("norm is '" + std::string(value) + "'; accepted: fully_normalized");
   }
@@ -132,8 +135,8 @@ class GravityFieldReader {
   }
 
   void read_coefficient(std::string_view line) {
-    const std::optional<int> n = whole_number_in<int>(take_word(line));
-    const std::optional<int> m = whole_number_in<int>(take_word(line));
+    const std::optional<int> n = number_in<int>(take_word(line));
+    const std::optional<int> m = number_in<int>(take_word(line));
     const std::optional<double> C = real_in(take_word(line));
     const std::optional<double> S = real_in(take_word(line));
     if (!n || !m || !C || !S) fail("malformed; accepted: gfc n m C S with four finite numbers");

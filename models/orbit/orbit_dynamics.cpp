@@ -85,6 +85,11 @@ QuasiNonsingularElements gauss(const Geometry& g, const QuasiNonsingularElements
               (-p * e_cos_f * f.x + (p + r) * e_sin_f * f.y) / (h * (1 + g.eta))};
 }
 
+Vec3 point_mass_ECI(const Vec3& r_ECI) {
+  const double r = norm(r_ECI);
+  return -kMuEarth_m3ps2 / (r * r * r) * r_ECI;
+}
+
 bool is_flyable(const QuasiNonsingularElements& x) {
   return x.a_m > 0 && std::isfinite(x.a_m) && x.ex * x.ex + x.ey * x.ey < 1 &&
          std::isfinite(x.i_rad) && std::isfinite(x.raan_rad) && std::isfinite(x.u_rad) &&
@@ -127,11 +132,8 @@ OrbitDynamics::Evaluation OrbitDynamics::evaluate(SimTime t, const QuasiNonsingu
 OrbitDynamics::State OrbitDynamics::completed(SimTime t, const QuasiNonsingularElements& x,
                                               double mass_kg, const Surroundings& around) const {
   const Evaluation e = evaluate(t, x, mass_kg, around);
-  const double r = norm(e.state.r_ECI);
-  return {{t, e.state.r_ECI, e.state.v_ECI, mass_kg},
-          x,
-          e.rate,
-          e.perturbation_ECI - kMuEarth_m3ps2 / (r * r * r) * e.state.r_ECI};
+  const Vec3 a_ECI = e.perturbation_ECI + point_mass_ECI(e.state.r_ECI);
+  return {{t, e.state.r_ECI, e.state.v_ECI, mass_kg}, x, e.rate, a_ECI, a_ECI};
 }
 
 OrbitDynamics::State OrbitDynamics::start(const OrbitState& initial) const {
@@ -148,6 +150,8 @@ OrbitDynamics::State OrbitDynamics::step(const State& from, SimTime to) const {
   const Duration span = to - from.orbit.t;
   const double dt_s = to_seconds(span), mass_kg = from.orbit.mass_kg;
   const SimTime middle = from.orbit.t + span / 2;
+  // A force that is switched at `to` still has its old value on the way there.
+  const SimTime just_before = to - 1ns;
   const auto rate_at = [&](SimTime t, const QuasiNonsingularElements& x,
                            const Surroundings& around) {
     // Before the forces see it: a field need not converge below the ground.
@@ -162,13 +166,18 @@ OrbitDynamics::State OrbitDynamics::step(const State& from, SimTime to) const {
   const QuasiNonsingularElements& k1 = from.rate;
   const QuasiNonsingularElements k2 = rate_at(middle, plus(x, dt_s / 2, k1), in_middle);
   const QuasiNonsingularElements k3 = rate_at(middle, plus(x, dt_s / 2, k2), in_middle);
-  const QuasiNonsingularElements k4 = rate_at(to, plus(x, dt_s, k3), at_end);
+  const QuasiNonsingularElements k4 = rate_at(just_before, plus(x, dt_s, k3), at_end);
   QuasiNonsingularElements next = plus(x, dt_s / 6, weighted(k1, k2, k3, k4));
   next.u_rad = unwound(next.u_rad);
   if (!is_flyable(next)) throw PropagationError("the orbit is no longer an ellipse", from.orbit);
   if (solve_kepler(next).r_m < kRadiusEarth_m)
     throw PropagationError("the orbit went below the ground", from.orbit);
-  return completed(to, next, mass_kg, at_end);
+  State end = completed(to, next, mass_kg, at_end);
+  if (next_discontinuity(from.orbit.t) == to) {
+    end.a_before_ECI = evaluate(just_before, next, mass_kg, at_end).perturbation_ECI +
+                       point_mass_ECI(end.orbit.r_ECI);
+  }
+  return end;
 }
 
 OrbitDynamics::State OrbitDynamics::after_impulse(const State& at, const Vec3& dv_ECI) const {
@@ -196,7 +205,7 @@ OrbitState OrbitDynamics::interpolate(const State& a, const State& b, SimTime t)
   // acceleration at b.
   const Vec3 dr = b.orbit.r_ECI - a.orbit.r_ECI - h * a.orbit.v_ECI - (0.5 * h * h) * a.a_ECI;
   const Vec3 dv = h * (b.orbit.v_ECI - a.orbit.v_ECI - h * a.a_ECI);
-  const Vec3 da = (h * h) * (b.a_ECI - a.a_ECI);
+  const Vec3 da = (h * h) * (b.a_before_ECI - a.a_ECI);
   const Vec3 c3 = 10 * dr - 4 * dv + 0.5 * da;
   const Vec3 c4 = -15 * dr + 7 * dv - da;
   const Vec3 c5 = 6 * dr - 3 * dv + 0.5 * da;

@@ -43,7 +43,8 @@ class OrbitDynamics {
     OrbitState orbit;
     QuasiNonsingularElements elements;
     QuasiNonsingularElements rate;  // derivative of the elements [1/s]
-    Vec3 a_ECI;                     // whole acceleration [m/s^2]
+    Vec3 a_ECI;                     // whole acceleration [m/s^2] from this instant on
+    Vec3 a_before_ECI;              // and up to it: another one where a force jumps
   };
 
   /// @throws std::invalid_argument  null environment or null force.
