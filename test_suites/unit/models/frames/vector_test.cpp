@@ -27,7 +27,7 @@ double largest_difference(const Mat3& a, const Mat3& b) {
 TEST(VectorTest, MatrixTurnsComponentsIntoTurnedAxes) {
   // Axes turned by +90 deg about z: what lay along the old x now lies along the new -y.
   const Mat3 R_BA{{0, 1, 0}, {-1, 0, 0}, {0, 0, 1}};
-  EXPECT_EQ(R_BA * Vec3(1, 0, 0), Vec3(0, -1, 0));
+  EXPECT_EQ(R_BA * (Vec3{1, 0, 0}), (Vec3{0, -1, 0}));
 }
 
 TEST(QuaternionTest, AxesTurnedAboutZHaveTheDocumentedQuaternion) {
