@@ -18,7 +18,8 @@ target_link_libraries(orrery_numerics INTERFACE orrery_sanitizers)
 
 add_library(orrery_warnings INTERFACE)
 target_compile_options(orrery_warnings INTERFACE
-  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
+  $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor>
   $<$<COMPILE_LANGUAGE:CXX>:-Woverloaded-virtual>
   $<$<BOOL:${ORRERY_WARNINGS_AS_ERRORS}>:-Werror>)
 target_compile_options(orrery_warnings INTERFACE

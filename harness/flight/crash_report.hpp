@@ -1,9 +1,10 @@
 /// What is known about the end of a flight process that crashed.
 #pragma once
 
-#include <cstdint>
 #include <orrery/harness/kernel/bytes.hpp>
 #include <orrery/harness/kernel/time.hpp>
+
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,7 @@ enum class CrashKind : std::uint8_t {
   kBootFailure,    // create returned anything but ORRERY_OK
   kHeapFault,      // double free, free of what is no block, overwritten block header
   kHeapExhausted,  // passed the cap, with HeapExhaustion::kCrash
+  kNoProgress,     // its tick fired over and over at one instant
 };
 const char* to_string(CrashKind kind);
 

@@ -1,12 +1,13 @@
 /// Binds a flight process to the event loop: inputs, ticks, outputs, the processor's time.
 #pragma once
 
-#include <cstdint>
-#include <functional>
-#include <memory>
 #include <orrery/harness/flight/flight_process.hpp>
 #include <orrery/harness/flight/onboard_clock.hpp>
 #include <orrery/harness/kernel/event_loop.hpp>
+
+#include <cstdint>
+#include <functional>
+#include <memory>
 #include <string_view>
 #include <vector>
 
@@ -23,7 +24,7 @@ namespace orrery {
 ///          fires when the call that asked for it has ended.
 /// Crash    Outputs and tick request of the crashed call are discarded, as are outputs that had not
 ///          left yet and waiting inputs; then Hooks::on_crash decides. A dead process gets nothing.
-/// Events   Kinds 100-106; none allocates once the buffers have grown to their sizes.
+/// Events   Kinds 100-104; none allocates once the buffers have grown to their sizes.
 class FlightComputer {
  public:
   /// Called in simulator context; each may be empty. on_crash and on_output may throw.

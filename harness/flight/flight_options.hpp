@@ -1,8 +1,9 @@
 /// How one flight process is loaded and what it is given.
 #pragma once
 
-#include <cstdint>
 #include <orrery/harness/kernel/time.hpp>
+
+#include <cstdint>
 #include <string>
 
 namespace orrery {

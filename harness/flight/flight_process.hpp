@@ -2,14 +2,15 @@
 /// it.
 #pragma once
 
-#include <cstdint>
-#include <memory>
-#include <optional>
 #include <orrery/harness/flight/crash_report.hpp>
 #include <orrery/harness/flight/flight_options.hpp>
 #include <orrery/harness/heap/heap_figures.hpp>
 #include <orrery/harness/kernel/bytes.hpp>
 #include <orrery/harness/kernel/time.hpp>
+
+#include <cstdint>
+#include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -57,9 +58,10 @@ struct CallRecord {
 ///            heap when the library is loaded first.
 class FlightProcess {
  public:
-  /// Loads the library; nothing of it runs yet but, with kShared, its static constructors.
-  /// @throws std::invalid_argument  the library is missing, does not load, or breaks the ABI; an
-  ///                                option outside its range. The message says which and why.
+  /// Loads the library, runs its static constructors and reads its port table.
+  /// @throws std::invalid_argument  the library is missing, does not load, crashes while it does,
+  ///                                or breaks the ABI; an option outside its range. The message
+  ///                                says which and why.
   explicit FlightProcess(FlightProcessOptions options);
   ~FlightProcess();  // as shut_down(), if still alive
   FlightProcess(const FlightProcess&) = delete;
@@ -97,8 +99,11 @@ class FlightProcess {
   std::size_t log_count() const;
   LogLine log_line(std::size_t index) const;
   const CallRecord& call_record() const;
-  /// Of the last call that returned CallOutcome::kCrashed.
+  /// Of the last call that returned CallOutcome::kCrashed, or of end().
   const CrashReport& crash() const;
+  /// Ends the process between calls, as a crash that was found from outside.
+  /// @throws std::logic_error  unless alive(), or within a call.
+  void end(CrashKind kind, const std::string& message, SimTime truth, std::int64_t onboard_ns);
 
   HeapFigures heap() const;
   /// Below what the heap already has is allowed: it stops growing.
@@ -108,6 +113,12 @@ class FlightProcess {
   using Storage = std::vector<std::pair<std::uint32_t, ByteBuffer>>;  // by slot number, ascending
   const Storage& storage() const;
   void set_storage(Storage storage);
+
+  /// Symbols of the library that would have been one for all its copies, and were made one per
+  /// copy.
+  const std::vector<std::string>& edited_symbols() const;
+  /// Libraries of the team's own that all copies of this one share.
+  const std::vector<std::string>& shared_dependencies() const;
 
   /// Host time spent within calls, for reports only: it repeats in no run.
   Duration host_time_in_flight() const;

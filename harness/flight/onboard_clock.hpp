@@ -1,8 +1,9 @@
 /// The clock of one spacecraft, as its flight software reads it.
 #pragma once
 
-#include <cstdint>
 #include <orrery/harness/kernel/time.hpp>
+
+#include <cstdint>
 
 namespace orrery {
 

@@ -80,6 +80,7 @@ class FirstFitHeap {
   /// Everything since construction. Constant time, but the list is walked for the largest free
   /// block if the last such one was taken.
   HeapFigures figures() const;
+  std::uint64_t limit_bytes() const { return options_.limit_bytes; }
   std::uint64_t live_bytes() const { return live_bytes_; }
   std::uint64_t allocations() const { return allocations_; }
   std::uint64_t peak_since_mark_bytes() const { return peak_bytes_; }

@@ -1,0 +1,329 @@
+#include <orrery/harness/flight/containment.hpp>
+#include <orrery/harness/flight/floating_point.hpp>
+#include <orrery/harness/heap/interposition.hpp>
+#include <orrery/harness/kernel/sim_state.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <cxxabi.h>
+#include <exception>
+#include <mutex>
+#include <pthread.h>
+#include <setjmp.h>
+#include <signal.h>
+#include <stdexcept>
+#include <sys/mman.h>
+#include <typeinfo>
+#include <unistd.h>
+#include <unwind.h>
+
+#if defined(__SANITIZE_ADDRESS__)
+#define ORRERY_LEAK_SANITIZER
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define ORRERY_LEAK_SANITIZER
+#endif
+#endif
+#ifdef ORRERY_LEAK_SANITIZER
+#include <sanitizer/lsan_interface.h>
+#endif
+
+namespace orrery::internal {
+namespace {
+
+constexpr std::array<int, 5> kSignals = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
+
+// The call that is on this thread's stack. There is at most one: calls do not nest.
+struct RunningCall {
+  sigjmp_buf jump;
+  ContainedProcess* process = nullptr;
+  CrashCapture* capture = nullptr;
+  const void* boundary = nullptr;  // on the stack: what lies above is the simulator's
+};
+
+#define ORRERY_INITIAL_EXEC [[gnu::tls_model("initial-exec")]]
+
+ORRERY_INITIAL_EXEC constinit thread_local RunningCall* running_call = nullptr;
+// Flight code is what runs now. volatile: read by the signal handler.
+ORRERY_INITIAL_EXEC constinit thread_local volatile bool in_flight_code = false;
+ORRERY_INITIAL_EXEC constinit thread_local volatile bool unwinding = false;
+
+struct sigaction previous_actions[kSignals.size()];
+std::terminate_handler previous_terminate = nullptr;
+
+// ---- leaving
+
+struct Unwinding {
+  const RunningCall* call;
+  std::uintptr_t begin;  // the instruction that raised the signal, or 0
+  bool begun;
+};
+
+_Unwind_Reason_Code add_frame(_Unwind_Context* context, void* argument) {
+  Unwinding& state = *static_cast<Unwinding*>(argument);
+  CrashCapture& capture = *state.call->capture;
+  const std::uintptr_t address = _Unwind_GetIP(context);
+  if (!state.begun && address != state.begin) return _URC_NO_REASON;
+  // On the way from the signal's stack to the program's, addresses do not compare; so only from
+  // here.
+  state.begun = true;
+  if (_Unwind_GetCFA(context) >= reinterpret_cast<std::uintptr_t>(state.call->boundary)) {
+    return _URC_END_OF_STACK;
+  }
+  capture.frames[capture.frame_count++] = reinterpret_cast<void*>(address);
+  return capture.frame_count == CrashCapture::kMostFrames ? _URC_END_OF_STACK : _URC_NO_REASON;
+}
+
+// `from`: see Unwinding::begin. The stack may be damaged, so a fault on it ends the walk.
+void capture_stack(const RunningCall& call, std::uintptr_t from) {
+  Unwinding state{&call, from, from == 0};
+  unwinding = true;
+  _Unwind_Backtrace(add_frame, &state);
+  unwinding = false;
+}
+
+[[noreturn]] void leave(RunningCall& call, CrashKind kind, int signal, std::uintptr_t from) {
+  in_flight_code = false;
+  current_heap = nullptr;
+  call.capture->kind = kind;
+  call.capture->signal = signal;
+  call.capture->frame_count = 0;
+  capture_stack(call, from);
+  siglongjmp(call.jump, 1);
+}
+
+std::uintptr_t instruction_of(void* context) {
+#if defined(__x86_64__)
+  return static_cast<std::uintptr_t>(static_cast<ucontext_t*>(context)->uc_mcontext.gregs[REG_RIP]);
+#else
+  (void)context;
+  return 0;
+#endif
+}
+
+// Not ours: as if this handler had never been there.
+void pass_on(int signal, const siginfo_t& info) {
+  for (std::size_t i = 0; i < kSignals.size(); ++i) {
+    if (kSignals[i] == signal) sigaction(signal, &previous_actions[i], nullptr);
+  }
+  // A fault comes again when the instruction is repeated; a signal that was sent has to be sent.
+  if (info.si_code <= 0) raise(signal);
+}
+
+void on_signal(int signal, siginfo_t* info, void* context) {
+  RunningCall* call = running_call;
+  const bool own = info->si_code > 0 || info->si_pid == getpid();
+  if (call != nullptr && own && unwinding) {
+    unwinding = false;
+    siglongjmp(call->jump, 1);
+  }
+  if (call == nullptr || !in_flight_code || !own) {
+    pass_on(signal, *info);
+    return;
+  }
+  if (info->si_code > 0) {
+    std::snprintf(call->capture->message, sizeof call->capture->message, "%s at address %p",
+                  sigdescr_np(signal), info->si_addr);
+  } else {
+    std::snprintf(call->capture->message, sizeof call->capture->message, "%s raised",
+                  sigdescr_np(signal));
+  }
+  leave(*call, signal == SIGABRT ? CrashKind::kAbort : CrashKind::kSignal, signal,
+        instruction_of(context));
+}
+
+// "std::runtime_error: no fix"; the object is flight code's, so it is asked as flight code.
+void describe_exception(char* text, std::size_t size) {
+  const std::type_info* type = abi::__cxa_current_exception_type();
+  if (type == nullptr) {
+    std::snprintf(text, size, "std::terminate called");
+    return;
+  }
+  int status = 0;
+  char* readable = abi::__cxa_demangle(type->name(), nullptr, nullptr, &status);
+  const char* name = status == 0 ? readable : type->name();
+  try {
+    throw;
+  } catch (const std::exception& e) {
+    std::snprintf(text, size, "uncaught %s: %s", name, e.what());
+  } catch (...) {
+    std::snprintf(text, size, "uncaught exception of type %s", name);
+  }
+}
+
+void on_terminate() {
+  RunningCall* call = running_call;
+  if (call != nullptr && in_flight_code) {
+    describe_exception(call->capture->message, sizeof call->capture->message);
+    leave(*call, CrashKind::kException, 0, 0);
+  }
+  if (previous_terminate != nullptr) previous_terminate();
+  std::abort();
+}
+
+void on_exit_called(int status) {
+  char message[64];
+  std::snprintf(message, sizeof message, "exit(%d) called", status);
+  end_running_call(CrashKind::kExit, message);
+}
+
+bool keep_exit_function(void (*function)(void*), void* argument) {
+  if (running_call == nullptr || !in_flight_code) return false;
+  const SimulatorScope scope;
+  running_call->process->exit_functions.push_back({function, argument});
+  return true;
+}
+
+constexpr ProcessHooks kProcessHooks = {keep_exit_function, on_exit_called};
+
+// ---- set-up
+
+void install_once() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    warm_up_libraries();
+    // The unwinder loads its tables when it is first used: not in a signal handler, please.
+    _Unwind_Backtrace([](_Unwind_Context*, void*) { return _URC_NO_REASON; }, nullptr);
+    struct sigaction action {};
+    action.sa_sigaction = on_signal;
+    // The mask stays as it is, so that it need not be put back after every crash; a fault of the
+    // unwinder must come through.
+    action.sa_flags = SA_SIGINFO | SA_ONSTACK | SA_NODEFER;
+    sigemptyset(&action.sa_mask);
+    for (std::size_t i = 0; i < kSignals.size(); ++i) {
+      sigaction(kSignals[i], &action, &previous_actions[i]);
+    }
+    previous_terminate = std::set_terminate(on_terminate);
+    process_hooks = &kProcessHooks;
+  });
+}
+
+// A stack overflow leaves no room for the handler, so it has a stack of its own. The unwinder needs
+// some 10 kB.
+class SignalStack {
+ public:
+  SignalStack() {
+    install_once();
+    memory_ = mmap(nullptr, kBytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (memory_ == MAP_FAILED) throw std::runtime_error("no memory for a signal stack");
+    stack_t stack{};
+    stack.ss_sp = memory_;
+    stack.ss_size = kBytes;
+    sigaltstack(&stack, &previous_);
+    pthread_sigmask(SIG_SETMASK, nullptr, &mask_);
+  }
+  ~SignalStack() {
+    sigaltstack(&previous_, nullptr);
+    munmap(memory_, kBytes);
+  }
+  const sigset_t& mask() const { return mask_; }
+
+ private:
+  static constexpr std::size_t kBytes = 128 * 1024;
+  void* memory_;
+  stack_t previous_{};
+  sigset_t mask_;
+};
+
+SignalStack& signal_stack_of_this_thread() {
+  static thread_local SignalStack stack;
+  return stack;
+}
+
+// What the C++ runtime keeps per thread: a crash within a catch block would leave it set.
+struct ExceptionState {
+  void* caught = nullptr;
+  unsigned uncaught = 0;
+  static ExceptionState& current() {
+    return *reinterpret_cast<ExceptionState*>(abi::__cxa_get_globals());
+  }
+};
+
+// An exception that gets here ends the process where it was thrown.
+[[gnu::noinline]] void call_as_flight_code(RunningCall& call, void (*function)(void*),
+                                           void* argument) noexcept {
+  call.boundary = __builtin_frame_address(0);
+  in_flight_code = true;
+  function(argument);
+  in_flight_code = false;
+}
+
+// Apart, so that no variable of a caller lives across the jump. True if the function returned.
+[[gnu::noinline]] bool call_or_crash(RunningCall& call, void (*function)(void*), void* argument) {
+  if (sigsetjmp(call.jump, 0) != 0) return false;
+  call_as_flight_code(call, function, argument);
+  return true;
+}
+
+}  // namespace
+
+bool run_contained(ContainedProcess& process, void (*function)(void*), void* argument,
+                   CrashCapture& capture) {
+  const SignalStack& signal_stack = signal_stack_of_this_thread();
+  if (running_call != nullptr) {
+    throw std::logic_error(std::string("flight process ") + process.name +
+                           ": a call within a call of " + running_call->process->name);
+  }
+  const ExceptionState exceptions = ExceptionState::current();
+  const FloatingPointControl control = FloatingPointControl::read();
+  const char* previous_name = sim_process;
+  RunningCall call;
+  call.process = &process;
+  call.capture = &capture;
+  capture.message[0] = 0;
+
+  running_call = &call;
+  sim_process = process.name;
+  bool returned = false;
+  {
+    const HeapGuard guard(process.heap);
+#ifdef ORRERY_LEAK_SANITIZER
+    __lsan_disable();  // what a dead process had allocated is not a leak
+#endif
+    returned = call_or_crash(call, function, argument);
+#ifdef ORRERY_LEAK_SANITIZER
+    __lsan_enable();
+#endif
+  }
+  sim_process = previous_name;
+  running_call = nullptr;
+  if (FloatingPointControl::read() != control) {
+    control.restore();
+    process.changed_floating_point = true;
+  }
+  if (!returned) {
+    ExceptionState::current() = exceptions;
+    pthread_sigmask(SIG_SETMASK, &signal_stack.mask(), nullptr);
+  }
+  return returned;
+}
+
+bool call_in_progress() {
+  return running_call != nullptr;
+}
+
+ContainedProcess* running_process() {
+  return running_call == nullptr ? nullptr : running_call->process;
+}
+
+void end_running_call(CrashKind kind, const char* message) {
+  RunningCall* call = running_call;
+  if (call == nullptr || !in_flight_code) return;
+  std::snprintf(call->capture->message, sizeof call->capture->message, "%s", message);
+  leave(*call, kind, 0, 0);
+}
+
+SimulatorScope::SimulatorScope() : heap_(current_heap) {
+  in_flight_code = false;
+  current_heap = nullptr;
+}
+
+SimulatorScope::~SimulatorScope() {
+  current_heap = heap_;
+  in_flight_code = true;
+}
+
+}  // namespace orrery::internal

@@ -1,0 +1,419 @@
+#include <orrery/harness/flight/flight_computer.hpp>
+#include <orrery/harness/flight/payload_pool.hpp>
+
+#include <algorithm>
+#include <orrery_flight.h>
+#include <stdexcept>
+#include <string>
+
+namespace orrery {
+namespace {
+
+constexpr EventKind kBoot{100, "flight boot"};
+constexpr EventKind kInput{101, "flight input"};
+constexpr EventKind kTick{102, "flight tick"};
+constexpr EventKind kOutput{103, "flight output"};
+constexpr EventKind kProcessorFree{104, "processor free"};
+
+constexpr std::size_t kMostWaiting = 64;
+constexpr std::uint64_t kMostWaiting_bytes = 1 << 20;
+// A tick that asks for a time that has passed fires again at once. So many in a row are no plan:
+// the usual cause is a period given where a time is expected.
+constexpr int kMostTicksAtOneInstant = 10'000;
+
+}  // namespace
+
+class FlightComputer::Impl {
+ public:
+  Impl(EventLoop& loop, OwnerId owner, FlightProcessOptions options, Hooks hooks);
+
+  void boot();
+  void shut_down();
+  void deliver(std::string_view port, Bytes bytes, OwnerId origin);
+  std::uint32_t find_port(std::string_view name, PortDirection direction) const;
+  std::uint32_t require_input(const char* function, std::string_view name) const;
+  std::int64_t onboard_ns() const { return clock.onboard_ns(loop_.now()); }
+
+  FlightProcess process;
+  OnboardClock clock;
+  std::uint64_t crashes = 0, calls = 0, rejected = 0, inputs_lost = 0, outputs_discarded = 0;
+  std::vector<std::uint64_t> dropped;  // by port
+
+ private:
+  struct Waiting {
+    std::uint32_t port, payload;
+    SimTime arrival;
+  };
+
+  void on_input(std::uint32_t port, std::uint32_t payload);
+  void on_tick();
+  void on_output(std::uint32_t port, std::uint32_t payload, std::uint32_t life);
+  void on_processor_free();
+
+  bool busy() const { return loop_.now() < busy_until_; }
+  bool others_wait() const { return !waiting_.empty() || tick_waits_; }
+  void enqueue(std::uint32_t port, std::uint32_t payload);
+  void wake_when_free();
+  void run_input(std::uint32_t port, std::uint32_t payload);
+  void run_tick();
+  void take_over(CallOutcome outcome);
+  void release_outputs();
+  void set_tick(std::int64_t onboard_ns);
+  void withdraw_tick();
+  bool makes_progress();
+  void bury();
+  void tell(CallOutcome outcome);
+  void warn(const std::string& line);
+
+  EventLoop& loop_;
+  OwnerId owner_;
+  Hooks hooks_;
+  internal::PayloadPool payloads_;
+
+  bool booted_ = false;
+  SimTime busy_until_;
+  std::vector<Waiting> waiting_;  // in order of arrival
+  std::uint64_t waiting_bytes_ = 0;
+  EventHandle free_event_;  // pending while something waits
+
+  EventHandle tick_event_;
+  bool tick_waits_ = false;  // it was due while the processor was busy
+  SimTime tick_due_;
+  bool warned_of_tick_ = false;
+  SimTime last_tick_;
+  int ticks_here_ = 0;
+
+  std::uint32_t life_ = 0;  // counts crashes: an output belongs to one life
+  SimTime died_;
+};
+
+FlightComputer::Impl::Impl(EventLoop& loop, OwnerId owner, FlightProcessOptions options,
+                           Hooks hooks)
+    : process(std::move(options)),
+      loop_(loop),
+      owner_(owner),
+      hooks_(std::move(hooks)),
+      busy_until_(loop.now()) {
+  if (process.options().execution_time < Duration{0}) {
+    throw std::invalid_argument("FlightComputer: execution_time = " +
+                                to_string(process.options().execution_time) + "; it is 0 or more");
+  }
+  dropped.resize(process.ports().size(), 0);
+  waiting_.reserve(kMostWaiting);
+}
+
+// ---- ports
+
+std::uint32_t FlightComputer::Impl::find_port(std::string_view name,
+                                              PortDirection direction) const {
+  const std::vector<FlightPort>& ports = process.ports();
+  for (std::uint32_t i = 0; i < ports.size(); ++i) {
+    if (ports[i].direction == direction && ports[i].name == name) return i;
+  }
+  return UINT32_MAX;
+}
+
+std::uint32_t FlightComputer::Impl::require_input(const char* function,
+                                                  std::string_view name) const {
+  const std::uint32_t index = find_port(name, PortDirection::kIn);
+  if (index != UINT32_MAX) return index;
+  std::string known;
+  for (const FlightPort& port : process.ports()) {
+    if (port.direction == PortDirection::kIn) known += (known.empty() ? "" : ", ") + port.name;
+  }
+  throw std::invalid_argument(std::string("FlightComputer::") + function + ": " +
+                              process_name(process.options()) + " has no input port \"" +
+                              std::string(name) + "\"; it has " + (known.empty() ? "none" : known));
+}
+
+// ---- events
+
+void FlightComputer::Impl::boot() {
+  if (booted_) {
+    throw std::logic_error("FlightComputer::boot: " + process_name(process.options()) +
+                           " was booted before");
+  }
+  booted_ = true;
+  loop_.schedule(loop_.now(), {Phase::kFault, owner_, owner_, &kBoot}, [this] {
+    ++calls;
+    busy_until_ = loop_.now() + process.options().execution_time;
+    take_over(process.create(loop_.now(), onboard_ns(), 0, ORRERY_POWER_ON));
+  });
+}
+
+void FlightComputer::Impl::deliver(std::string_view port, Bytes bytes, OwnerId origin) {
+  const std::uint32_t index = require_input("deliver", port);
+  const FlightPort& p = process.ports()[index];
+  const auto schedule = [&](Bytes part) {
+    const std::uint32_t payload = payloads_.put(part);
+    loop_.schedule(loop_.now(), {Phase::kDelivery, owner_, origin, &kInput},
+                   [this, index, payload] { on_input(index, payload); });
+  };
+  if (p.kind == PortKind::kStream) {
+    for (; bytes.size() > p.max_bytes; bytes = bytes.subspan(p.max_bytes)) {
+      schedule(bytes.first(p.max_bytes));
+    }
+  }
+  schedule(bytes);
+}
+
+void FlightComputer::Impl::on_input(std::uint32_t port, std::uint32_t payload) {
+  loop_.fingerprint_payload(payloads_[payload]);
+  if (!process.alive()) {
+    ++inputs_lost;
+    payloads_.give_back(payload);
+  } else if (busy() || others_wait()) {
+    enqueue(port, payload);
+  } else {
+    run_input(port, payload);
+  }
+}
+
+void FlightComputer::Impl::enqueue(std::uint32_t port, std::uint32_t payload) {
+  const std::uint64_t bytes = payloads_[payload].size();
+  if (waiting_.size() == kMostWaiting || waiting_bytes_ + bytes > kMostWaiting_bytes) {
+    ++dropped[port];
+    payloads_.give_back(payload);
+    return;
+  }
+  waiting_bytes_ += bytes;
+  waiting_.push_back({port, payload, loop_.now()});
+  wake_when_free();
+}
+
+void FlightComputer::Impl::wake_when_free() {
+  if (free_event_ != EventHandle{}) return;
+  free_event_ = loop_.schedule(std::max(busy_until_, loop_.now()),
+                               {Phase::kDelivery, owner_, owner_, &kProcessorFree},
+                               [this] { on_processor_free(); });
+}
+
+// One call, the one that has been due for longest; at one instant an input before the tick.
+void FlightComputer::Impl::on_processor_free() {
+  free_event_ = {};
+  if (!process.alive() || !others_wait()) return;
+  if (tick_waits_ && (waiting_.empty() || tick_due_ < waiting_.front().arrival)) {
+    run_tick();
+  } else {
+    const Waiting next = waiting_.front();
+    waiting_.erase(waiting_.begin());
+    waiting_bytes_ -= payloads_[next.payload].size();
+    run_input(next.port, next.payload);
+  }
+}
+
+void FlightComputer::Impl::run_input(std::uint32_t port, std::uint32_t payload) {
+  const FlightPort& p = process.ports()[port];
+  const internal::TakenPayload taken(payloads_, payload);
+  if (taken.bytes().size() > p.max_bytes) {
+    ++rejected;
+    if (others_wait()) wake_when_free();
+    warn("a packet of " + std::to_string(taken.bytes().size()) + " bytes is too long for port " +
+         p.name + ", which takes " + std::to_string(p.max_bytes));
+    return;
+  }
+  ++calls;
+  busy_until_ = loop_.now() + process.options().execution_time;
+  take_over(process.input(loop_.now(), onboard_ns(), p, taken.bytes()));
+}
+
+void FlightComputer::Impl::on_tick() {
+  tick_event_ = {};
+  if (busy() || others_wait()) {
+    tick_waits_ = true;
+    tick_due_ = loop_.now();
+    wake_when_free();
+  } else {
+    run_tick();
+  }
+}
+
+void FlightComputer::Impl::run_tick() {
+  tick_waits_ = false;
+  if (!makes_progress()) return;
+  ++calls;
+  busy_until_ = loop_.now() + process.options().execution_time;
+  take_over(process.tick(loop_.now(), onboard_ns()));
+}
+
+bool FlightComputer::Impl::makes_progress() {
+  if (last_tick_ != loop_.now()) ticks_here_ = 0;
+  last_tick_ = loop_.now();
+  if (++ticks_here_ <= kMostTicksAtOneInstant) return true;
+  process.end(CrashKind::kNoProgress,
+              std::to_string(kMostTicksAtOneInstant) +
+                  " ticks at one instant: each asked for a time that had passed already",
+              loop_.now(), onboard_ns());
+  bury();
+  if (hooks_.on_crash) hooks_.on_crash(process.crash());
+  return false;
+}
+
+void FlightComputer::Impl::on_output(std::uint32_t port, std::uint32_t payload,
+                                     std::uint32_t life) {
+  const internal::TakenPayload taken(payloads_, payload);
+  // Due at the very instant of the crash: it had left.
+  if (life != life_ && died_ < loop_.now()) {
+    ++outputs_discarded;
+    return;
+  }
+  loop_.fingerprint_payload(taken.bytes());
+  if (hooks_.on_output) hooks_.on_output(process.ports()[port].name, taken.bytes());
+}
+
+// ---- after a call
+
+// State first, then hooks: they may throw.
+void FlightComputer::Impl::take_over(CallOutcome outcome) {
+  if (outcome == CallOutcome::kCrashed) {
+    bury();
+  } else {
+    if (outcome == CallOutcome::kRejected) ++rejected;
+    release_outputs();
+    if (const auto request = process.tick_request()) set_tick(*request);
+    if (others_wait()) wake_when_free();
+  }
+  tell(outcome);
+}
+
+void FlightComputer::Impl::release_outputs() {
+  for (std::size_t i = 0; i < process.output_count(); ++i) {
+    const FlightProcess::Output output = process.output(i);
+    const std::uint32_t port = static_cast<std::uint32_t>(output.port - process.ports().data());
+    const std::uint32_t payload = payloads_.put(output.data);
+    const std::uint32_t life = life_;
+    loop_.schedule(busy_until_, {Phase::kOutput, owner_, owner_, &kOutput},
+                   [this, port, payload, life] { on_output(port, payload, life); });
+  }
+}
+
+void FlightComputer::Impl::set_tick(std::int64_t onboard_ns) {
+  withdraw_tick();
+  if (onboard_ns < 0) return;
+  if (!process.has_tick()) {
+    if (!warned_of_tick_) warn("a tick was requested, but the library has no tick function");
+    warned_of_tick_ = true;
+    return;
+  }
+  const SimTime due = clock.truth(onboard_ns);
+  tick_event_ = loop_.schedule(due <= loop_.now() ? busy_until_ : due,
+                               {Phase::kTick, owner_, owner_, &kTick}, [this] { on_tick(); });
+}
+
+void FlightComputer::Impl::withdraw_tick() {
+  loop_.cancel(tick_event_);
+  tick_event_ = {};
+  tick_waits_ = false;
+}
+
+// The process is dead: nothing that was on its way in remains.
+void FlightComputer::Impl::bury() {
+  ++crashes;
+  ++life_;
+  died_ = loop_.now();
+  withdraw_tick();
+  loop_.cancel(free_event_);
+  free_event_ = {};
+  inputs_lost += waiting_.size();
+  for (const Waiting& w : waiting_) payloads_.give_back(w.payload);
+  waiting_.clear();
+  waiting_bytes_ = 0;
+}
+
+void FlightComputer::Impl::tell(CallOutcome outcome) {
+  if (hooks_.on_log) {
+    for (std::size_t i = 0; i < process.log_count(); ++i) {
+      const FlightProcess::LogLine line = process.log_line(i);
+      hooks_.on_log(line.level, line.text);
+    }
+  }
+  if (hooks_.on_call) hooks_.on_call(process.call_record());
+  if (outcome == CallOutcome::kCrashed && hooks_.on_crash) hooks_.on_crash(process.crash());
+}
+
+void FlightComputer::Impl::warn(const std::string& line) {
+  if (hooks_.on_log) hooks_.on_log(LogLevel::kWarning, line);
+}
+
+void FlightComputer::Impl::shut_down() {
+  if (!process.alive()) return;
+  const CallOutcome outcome = process.shut_down(loop_.now(), onboard_ns());
+  if (outcome == CallOutcome::kCrashed) {
+    bury();
+  } else {
+    withdraw_tick();
+    loop_.cancel(free_event_);
+    free_event_ = {};
+    inputs_lost += waiting_.size();
+    for (const Waiting& w : waiting_) payloads_.give_back(w.payload);
+    waiting_.clear();
+  }
+  tell(outcome);
+}
+
+// ---- the public face
+
+FlightComputer::FlightComputer(EventLoop& loop, OwnerId owner, FlightProcessOptions options,
+                               Hooks hooks)
+    : impl_(std::make_unique<Impl>(loop, owner, std::move(options), std::move(hooks))) {}
+FlightComputer::~FlightComputer() = default;
+
+void FlightComputer::boot() {
+  impl_->boot();
+}
+void FlightComputer::shut_down() {
+  impl_->shut_down();
+}
+const FlightProcessOptions& FlightComputer::options() const {
+  return impl_->process.options();
+}
+const std::vector<FlightPort>& FlightComputer::ports() const {
+  return impl_->process.ports();
+}
+bool FlightComputer::has_input(std::string_view port) const {
+  return impl_->find_port(port, PortDirection::kIn) != UINT32_MAX;
+}
+bool FlightComputer::has_output(std::string_view port) const {
+  return impl_->find_port(port, PortDirection::kOut) != UINT32_MAX;
+}
+void FlightComputer::deliver(std::string_view port, Bytes bytes, OwnerId origin) {
+  impl_->deliver(port, bytes, origin);
+}
+bool FlightComputer::alive() const {
+  return impl_->process.alive();
+}
+std::uint64_t FlightComputer::crashes() const {
+  return impl_->crashes;
+}
+std::uint64_t FlightComputer::calls() const {
+  return impl_->calls;
+}
+std::uint64_t FlightComputer::rejected() const {
+  return impl_->rejected;
+}
+std::uint64_t FlightComputer::inputs_lost() const {
+  return impl_->inputs_lost;
+}
+std::uint64_t FlightComputer::outputs_discarded() const {
+  return impl_->outputs_discarded;
+}
+std::uint64_t FlightComputer::dropped(std::string_view port) const {
+  return impl_->dropped[impl_->require_input("dropped", port)];
+}
+HeapFigures FlightComputer::heap() const {
+  return impl_->process.heap();
+}
+void FlightComputer::set_heap_limit(std::uint64_t bytes) {
+  impl_->process.set_heap_limit(bytes);
+}
+std::int64_t FlightComputer::onboard_ns() const {
+  return impl_->onboard_ns();
+}
+OnboardClock& FlightComputer::clock() {
+  return impl_->clock;
+}
+Duration FlightComputer::host_time_in_flight() const {
+  return impl_->process.host_time_in_flight();
+}
+
+}  // namespace orrery

@@ -1,0 +1,42 @@
+/// Host time, for reports only: nothing in a run may depend on it.
+#pragma once
+
+#include <orrery/harness/kernel/time.hpp>
+
+#include <chrono>
+#include <cstdint>
+#if defined(__x86_64__)
+#include <x86intrin.h>
+#endif
+
+namespace orrery::internal {
+
+/// Sums up spans of some 100 ns, at a few ns each: counts cycles, and learns their length from the
+/// system's clock when it is asked.
+class HostStopwatch {
+ public:
+  void start() { started_ = ticks(); }
+  void stop() { sum_ += ticks() - started_; }
+  Duration total() const {
+    const double elapsed_ticks = static_cast<double>(ticks() - first_ticks_);
+    if (elapsed_ticks <= 0.0) return Duration{0};
+    const std::chrono::duration<double, std::nano> elapsed =
+        std::chrono::steady_clock::now() - first_time_;
+    return Duration(
+        static_cast<std::int64_t>(elapsed.count() * static_cast<double>(sum_) / elapsed_ticks));
+  }
+
+ private:
+  static std::uint64_t ticks() {
+#if defined(__x86_64__)
+    return __rdtsc();
+#else
+    return static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
+#endif
+  }
+  std::chrono::steady_clock::time_point first_time_ = std::chrono::steady_clock::now();
+  std::uint64_t first_ticks_ = ticks();
+  std::uint64_t started_ = 0, sum_ = 0;
+};
+
+}  // namespace orrery::internal

@@ -1,0 +1,15 @@
+/// Names for the addresses of a captured stack.
+#pragma once
+
+#include <orrery/harness/flight/containment.hpp>
+
+#include <string>
+#include <vector>
+
+namespace orrery::internal {
+
+/// Without the harness's own frames at either end. `library` is read for its symbols, hidden ones
+/// included; of other files only what the loader tells.
+std::vector<StackFrame> stack_frames(const CrashCapture& capture, const std::string& library);
+
+}  // namespace orrery::internal
