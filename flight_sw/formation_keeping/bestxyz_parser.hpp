@@ -1,10 +1,9 @@
 /// Finds NovAtel BESTXYZ logs in a byte stream that may be cut anywhere.
 ///
 /// Method  Only a header that announces exactly a BESTXYZ body is collected; every other byte is
-/// scanned
-///         over. No length field is trusted before its CRC, so a corrupted or unknown log can
-///         neither stall the parser nor make it skip the log behind it: after a bad CRC the scan
-///         resumes one byte behind the false start, inside the bytes already held.
+///         scanned over. No length field is trusted before its CRC, so a corrupted or unknown log
+///         can neither stall the parser nor make it skip the log behind it: after a bad CRC the
+///         scan resumes one byte behind the false start, inside the bytes already held.
 /// Memory  One frame of 144 bytes. No allocation.
 /// Source  NovAtel OEM7 Commands and Logs Reference: binary header, BESTXYZ (241), CRC-32.
 #pragma once

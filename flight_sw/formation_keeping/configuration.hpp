@@ -19,8 +19,8 @@ struct ControlOptions {
   double converged_de_m = 1.0;  ///< likewise of each other element but a*dl
   double burn_lead_s = 60.0;    ///< a burn is commanded this long before its middle
   double keeping_horizon_rev = 2.0;  ///< keeping looks, and corrects, this far ahead
-  double keeping_deadband_m =
-      4.0;  ///< of a*de, a*di; a quarter of it for a*da, five times for a*dl
+  /// Of a*de and a*di; a quarter of it for a*da, five times it for a*dl.
+  double keeping_deadband_m = 4.0;
 };
 
 struct Configuration {

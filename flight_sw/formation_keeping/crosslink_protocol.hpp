@@ -1,14 +1,12 @@
 /// What the two spacecraft say to each other, and which of it still counts when it arrives.
 ///
 /// Message     88 bytes, little-endian: 0 u16 magic 0x4B46 | 2 u8 version | 3 u8 role of the sender
-/// |
-///             4 u32 boot count | 8 u32 sequence | 12 i64 GNSS epoch, GPS ns | 20 f64 r_ECEF[3] m |
-///             44 f64 v_ECEF[3] m/s | 68 f64 sigma_r m | 76 f64 sigma_v m/s | 84 u32 CRC-32 of the
-///             rest.
+///             | 4 u32 boot count | 8 u32 sequence | 12 i64 GNSS epoch, GPS ns | 20 f64 r_ECEF[3] m
+///             | 44 f64 v_ECEF[3] m/s | 68 f64 sigma_r m | 76 f64 sigma_v m/s | 84 u32 CRC-32 of
+///             the rest.
 /// Delivery    Messages may be lost, late, doubled and overtake each other. Each is a full state
-/// with
-///             the epoch it belongs to, so nothing is acknowledged or sent twice: a late one is as
-///             good a measurement as a prompt one, and the next one replaces a lost one.
+///             with the epoch it belongs to, so nothing is acknowledged or sent twice: a late one
+///             is as good a measurement as a prompt one, and the next one replaces a lost one.
 /// Receiving   A window of the last 64 sequence numbers, as in RFC 4303, tells late from doubled. A
 ///             restarted sender counts from zero again under a higher boot count; what its previous
 ///             life sent is stale. The sequence wraps.

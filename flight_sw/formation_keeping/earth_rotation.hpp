@@ -1,8 +1,8 @@
 /// ECEF (ITRF, no polar motion) to ECI (EME2000: mean equator and equinox of J2000).
 ///
 /// Method      IAU 1976 precession, the 13 largest terms of IAU 1980 nutation, GMST of 1982 with
-/// the
-///             equation of the equinoxes. Seidelmann (ed.), Explanatory Supplement (1992), §3.2.
+///             the equation of the equinoxes. Seidelmann (ed.), Explanatory Supplement (1992),
+///             §3.2.
 /// Accuracy    0.1 arcsec against the full series with equal UT1 (3 m at 550 km); leaving out polar
 ///             motion costs up to 0.5 arcsec, leaving UT1 - UTC at zero up to 15 arcsec per second.
 /// Valid for   1990 to 2050.

@@ -141,7 +141,11 @@ FormationController::Decision FormationController::plan(const FormationState& no
                           goal.end_ns - nanoseconds(kLastBurnBeforeEnd_s)};
   Plan plan;
   if (!planner_.plan(now, goal, miss, window, &plan)) {
-    decision.trouble = "no safe plan to the goal from here";
+    // In the last half revolution there may simply be no opportunity left.
+    const double left_s = seconds(window.last_ns - window.first_ns);
+    if (left_s > 0.5 * revolution_s(now.chief)) {
+      decision.trouble = "no safe plan within the impulse limit from here to the goal";
+    }
     return decision;
   }
   if (plan.count == 0) return decision;

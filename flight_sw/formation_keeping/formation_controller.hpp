@@ -2,16 +2,14 @@
 /// formation.
 ///
 /// Goal        A command is a goal with an end epoch. While it lasts, the controller predicts what
-/// will be
-///             missing at the end, and plans from the present estimate whenever that is worth a
-///             burn. Only the first burn of a plan is ever commanded; the rest is planned again
-///             from what the first one really did. So a lost or weak burn needs no special case.
+///             will be missing at the end, and plans from the present estimate whenever that is
+///             worth a burn. Only the first burn of a plan is ever commanded; the rest is planned
+///             again from what the first one really did. So a lost or weak burn needs no special
+///             case.
 /// Worth it    Far from the end only large misses are (they are cheap to make up early and small
-/// ones are
-///             still noise); in the last revolutions the trims are.
+///             ones are still noise); in the last revolutions the trims are.
 /// Keeping     After the end the same goal is pursued over a horizon of a few revolutions, as soon
-/// as a
-///             prediction leaves its deadband.
+///             as a prediction leaves its deadband.
 /// Checked by  test_suites/unit/flight_sw/formation_controller_test.cpp
 #pragma once
 

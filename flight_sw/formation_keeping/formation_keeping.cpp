@@ -84,6 +84,7 @@ class FormationKeeping {
   Mode reported_mode_ = Mode::kPassive;
   std::int64_t last_crosslink_slot_ = -1;
   std::int64_t last_telemetry_slot_ = -1;
+  bool in_trouble_ = false;
   double delta_v_mps_ = 0.0;
   std::uint32_t burns_ = 0, rejected_ = 0;
 };
@@ -245,7 +246,9 @@ void FormationKeeping::decide(std::int64_t now_ns) {
   }
   const FormationState now = navigation_.at(now_ns);
   const FormationController::Decision decision = controller_.decide(now);
-  if (decision.trouble != nullptr) host_.log(ORRERY_WARNING, decision.trouble);
+  // Once per spell: a decision that finds no plan comes back every few minutes.
+  if (decision.trouble != nullptr && !in_trouble_) host_.log(ORRERY_WARNING, decision.trouble);
+  in_trouble_ = decision.trouble != nullptr;
   if (controller_.mode() != reported_mode_) {
     reported_mode_ = controller_.mode();
     send_mode(now_ns);
@@ -342,6 +345,11 @@ std::int32_t create_checked(void** self, const orrery_host* host,
   return orrery_abi::Thunks<FormationKeeping>::create(self, host, boot);
 }
 
+orrery_flight with_checked_create(orrery_flight flight) {
+  flight.create = &create_checked;
+  return flight;
+}
+
 }  // namespace
 }  // namespace formation_keeping
 
@@ -349,8 +357,7 @@ extern "C" ORRERY_EXPORT const orrery_flight* ORRERY_FLIGHT_ENTRY(void) {
   using formation_keeping::FormationKeeping;
   static orrery_port
       ports[sizeof(FormationKeeping::ports()) / sizeof(FormationKeeping::ports()[0])];
-  static orrery_flight flight =
-      orrery_abi::describe(FormationKeeping::ports(), ports, "formation_keeping", "1.0");
-  flight.create = &formation_keeping::create_checked;
+  static const orrery_flight flight = formation_keeping::with_checked_create(
+      orrery_abi::describe(FormationKeeping::ports(), ports, "formation_keeping", "1.0"));
   return &flight;
 }

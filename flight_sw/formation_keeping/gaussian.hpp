@@ -12,9 +12,8 @@ struct Gaussian {
 
 /// Kalman update by a measurement of all six elements themselves, z = mean + N(0, R), in Joseph's
 /// form.
-/// @param gate  Normalised innovation squared above which nothing is changed. It is chi-square with
-/// six
-///              degrees of freedom: 33 is passed by all but one in 10^5.
+/// @param gate  Normalised innovation squared above which nothing is changed: chi-square with six
+///              degrees of freedom, 33 is exceeded once in 10^5.
 /// @return false if the innovation failed the gate, or R + P is singular.
 bool measure(Gaussian* state, const RelativeElements& z, const Matrix6& R, double gate);
 

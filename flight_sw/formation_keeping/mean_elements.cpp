@@ -10,9 +10,9 @@ namespace {
 using flight_support::Vec3;
 using flight_support::vec3;
 
-// In the orbital plane, axes along the ascending node and 90 deg ahead of it.
+// Where in the orbit: theta is the true argument of latitude.
 struct InPlane {
-  double theta_rad, r_m;
+  double sin_theta, cos_theta, r_m;
 };
 
 // Kepler's equation F - ex sin F + ey cos F = u for the eccentric argument of latitude F.
@@ -27,22 +27,29 @@ double eccentric_argument_rad(double u_rad, double ex, double ey) {
   return f;
 }
 
-InPlane in_plane(const OrbitElements& elements) {
-  const double ex = elements.ex, ey = elements.ey;
-  const double f = eccentric_argument_rad(elements.u_rad, ex, ey);
-  const double s = std::sin(f), c = std::cos(f);
-  const double beta = 1.0 / (1.0 + std::sqrt(1.0 - ex * ex - ey * ey));
-  const double x = (1.0 - beta * ey * ey) * c + beta * ex * ey * s - ex;
-  const double y = (1.0 - beta * ex * ex) * s + beta * ex * ey * c - ey;
-  return {std::atan2(y, x), elements.a_m * (1.0 - ex * c - ey * s)};
+InPlane in_plane(const OrbitElements& e, double sin_F, double cos_F) {
+  const double beta = 1.0 / (1.0 + std::sqrt(1.0 - e.ex * e.ex - e.ey * e.ey));
+  const double x = (1.0 - beta * e.ey * e.ey) * cos_F + beta * e.ex * e.ey * sin_F - e.ex;
+  const double y = (1.0 - beta * e.ex * e.ex) * sin_F + beta * e.ex * e.ey * cos_F - e.ey;
+  const double r = 1.0 - e.ex * cos_F - e.ey * sin_F;
+  return {y / r, x / r, e.a_m * r};
+}
+
+InPlane in_plane(const OrbitElements& e) {
+  const double f = eccentric_argument_rad(e.u_rad, e.ex, e.ey);
+  return in_plane(e, std::sin(f), std::cos(f));
 }
 
 constexpr int kPoints = 16;
+// sin(2 pi j / 16)
+constexpr double kS1 = 0.38268343236508977, kS2 = 0.70710678118654752, kS3 = 0.92387953251128676;
+constexpr double kSine[kPoints] = {0, kS1,  kS2,  kS3,  1,  kS3,  kS2,  kS1,
+                                   0, -kS1, -kS2, -kS3, -1, -kS3, -kS2, -kS1};
 
-// The trapezoidal sum in closed form. With f sampled at u_j, the zero-mean integral of f at u is
-// sum_j f_j single(u - u_j), and that integrated once more is sum_j f_j twice(u - u_j): each
-// harmonic k contributes sin(kx)/k, and -cos(kx)/k^2. The highest, k = kPoints/2, is left out as
-// ambiguous.
+// Integration along the orbit as a sum over its points. Let g(u) be a periodic function with the
+// harmonics c_k. Then the integral over u' of g(u') single(u - u') is the zero-mean integral of g
+// at u, which has the harmonics c_k / (ik), and twice() gives that of the integral once more.
+// Harmonics above kPoints/2 - 1 are left out: the sum could not tell them from lower ones.
 struct IntegrationKernel {
   double single, twice;
 };
@@ -61,25 +68,26 @@ IntegrationKernel integration_kernel(double x_rad) {
 }
 
 // Acceleration by J2 in the orbit's own RTN [m/s^2].
-Vec3 j2_acceleration_RTN(double r_m, double theta_rad, double sin_i, double cos_i) {
-  const double q = kRadiusEarth_m / r_m;
-  const double scale = -1.5 * kJ2 * kMuEarth_m3ps2 / (r_m * r_m) * q * q;
-  const double s = std::sin(theta_rad), c = std::cos(theta_rad);
+Vec3 j2_acceleration_RTN(const InPlane& at, double sin_i, double cos_i) {
+  const double q = kRadiusEarth_m / at.r_m;
+  const double scale = -1.5 * kJ2 * kMuEarth_m3ps2 / (at.r_m * at.r_m) * q * q;
+  const double s = at.sin_theta, c = at.cos_theta;
   return vec3(scale * (1.0 - 3.0 * sin_i * sin_i * s * s), scale * 2.0 * sin_i * sin_i * s * c,
               scale * 2.0 * sin_i * cos_i * s);
 }
 
 // Gauss's equations in these elements, per radian of u: Roscoe et al. (2015), with the mean
 // motion's own part of u' left out.
-OrbitElements gauss_rates_per_radian(const OrbitElements& e, const Vec3& f_RTN, double r_m,
-                                     double theta_rad) {
-  const double p = e.a_m * (1.0 - e.ex * e.ex - e.ey * e.ey);
+OrbitElements gauss_rates_per_radian(const OrbitElements& e, const Vec3& f_RTN, const InPlane& at,
+                                     double sin_i, double cos_i) {
+  const double eta2 = 1.0 - e.ex * e.ex - e.ey * e.ey;
+  const double eta = std::sqrt(eta2);
+  const double p = e.a_m * eta2;
   const double h = std::sqrt(kMuEarth_m3ps2 * p);
-  const double eta = std::sqrt(1.0 - e.ex * e.ex - e.ey * e.ey);
-  const double s = std::sin(theta_rad), c = std::cos(theta_rad);
+  const double r_m = at.r_m, s = at.sin_theta, c = at.cos_theta;
   const double e_cos_nu = p / r_m - 1.0;
   const double e_sin_nu = e.ex * s - e.ey * c;
-  const double cot_i = std::cos(e.i_rad) / std::sin(e.i_rad);
+  const double cot_i = cos_i / sin_i;
   const double per_radian = 1.0 / (h * mean_motion_radps(e.a_m));
   const double normal = r_m * f_RTN[2] * per_radian;
   const double radial = f_RTN[0] * per_radian;
@@ -90,7 +98,7 @@ OrbitElements gauss_rates_per_radian(const OrbitElements& e, const Vec3& f_RTN, 
   rate.ex = p * s * radial + ((p + r_m) * c + r_m * e.ex) * along + e.ey * s * cot_i * normal;
   rate.ey = -p * c * radial + ((p + r_m) * s + r_m * e.ey) * along - e.ex * s * cot_i * normal;
   rate.i_rad = c * normal;
-  rate.raan_rad = s / std::sin(e.i_rad) * normal;
+  rate.raan_rad = s / sin_i * normal;
   rate.u_rad = -2.0 * r_m * eta * radial - s * cot_i * normal +
                (-p * e_cos_nu * radial + (p + r_m) * e_sin_nu * along) / (1.0 + eta);
   return rate;
@@ -105,20 +113,24 @@ void add_scaled(OrbitElements* sum, double factor, const OrbitElements& term) {
   sum->raan_rad += factor * term.raan_rad;
 }
 
-// Osculating less mean elements, at the mean elements.
+// Osculating less mean elements, at the mean elements. The points are equally spaced in the
+// eccentric argument of latitude, which spares Kepler's equation; du = (1 - ex cos F - ey sin F)
+// dF.
 OrbitElements short_period_variation(const OrbitElements& mean) {
   const double sin_i = std::sin(mean.i_rad), cos_i = std::cos(mean.i_rad);
   OrbitElements variation;
-  OrbitElements sample = mean;
   for (int j = 0; j < kPoints; ++j) {
-    sample.u_rad = kTwoPi * j / kPoints;
-    const InPlane at = in_plane(sample);
-    const Vec3 f_RTN = j2_acceleration_RTN(at.r_m, at.theta_rad, sin_i, cos_i);
-    const OrbitElements rate = gauss_rates_per_radian(sample, f_RTN, at.r_m, at.theta_rad);
-    const IntegrationKernel kernel = integration_kernel(mean.u_rad - sample.u_rad);
-    add_scaled(&variation, kernel.single, rate);
+    const double F = kTwoPi * j / kPoints;
+    const double s = kSine[j], c = kSine[(j + kPoints / 4) % kPoints];
+    const InPlane at = in_plane(mean, s, c);
+    const Vec3 f_RTN = j2_acceleration_RTN(at, sin_i, cos_i);
+    const OrbitElements rate = gauss_rates_per_radian(mean, f_RTN, at, sin_i, cos_i);
+    const double u = F - mean.ex * s + mean.ey * c;
+    const double weight = at.r_m / mean.a_m;
+    const IntegrationKernel kernel = integration_kernel(mean.u_rad - u);
+    add_scaled(&variation, weight * kernel.single, rate);
     // A longer semi-major axis slows the mean motion: dn/n = -3/2 da/a, integrated once more.
-    variation.u_rad += -1.5 * rate.a_m / mean.a_m * kernel.twice;
+    variation.u_rad += -1.5 * rate.a_m / mean.a_m * weight * kernel.twice;
   }
   return variation;
 }
@@ -139,7 +151,8 @@ double mean_motion_radps(double a_m) {
 }
 
 double true_argument_of_latitude_rad(const OrbitElements& elements) {
-  return in_plane(elements).theta_rad;
+  const InPlane at = in_plane(elements);
+  return std::atan2(at.sin_theta, at.cos_theta);
 }
 
 OrbitElements osculating_from_state(const StateEci& state) {
@@ -174,7 +187,7 @@ StateEci state_from_osculating(const OrbitElements& e) {
   const Vec3 to_node = vec3(std::cos(e.raan_rad), std::sin(e.raan_rad), 0.0);
   const Vec3 ahead = vec3(-std::cos(e.i_rad) * std::sin(e.raan_rad),
                           std::cos(e.i_rad) * std::cos(e.raan_rad), std::sin(e.i_rad));
-  const double s = std::sin(at.theta_rad), c = std::cos(at.theta_rad);
+  const double s = at.sin_theta, c = at.cos_theta;
   const double speed = std::sqrt(kMuEarth_m3ps2 / (e.a_m * (1.0 - e.ex * e.ex - e.ey * e.ey)));
   return {at.r_m * c * to_node + at.r_m * s * ahead,
           -speed * (e.ey + s) * to_node + speed * (e.ex + c) * ahead};
@@ -188,8 +201,8 @@ OrbitElements osculating_from_mean(const OrbitElements& mean) {
   return osculating;
 }
 
-// Fixed point: the variation changes by 1e-3 of an error in where it is evaluated, so that three
-// rounds leave 1e-9 of it, far below a millimetre.
+// Fixed point: the variation changes by 1e-3 of an error in where it is evaluated, so each round
+// takes three digits off its kilometres.
 OrbitElements mean_from_osculating(const OrbitElements& osculating) {
   OrbitElements mean = osculating;
   for (int round = 0; round < 3; ++round) {

@@ -3,15 +3,13 @@
 /// Elements    Quasi-nonsingular: a, u = omega + M, ex = e cos omega, ey = e sin omega, i, RAAN, in
 ///             EME2000. Singular at i = 0 and 180 deg only.
 /// Mean        The osculating elements less their short-period variation by J2, first order, zero
-/// mean
-///             over M (the convention of Brouwer 1959). The variation is the integral of Gauss's
-///             equations along the mean orbit, less its average: a trapezoidal sum over one turn,
-///             which for a periodic function converges faster than any power of the number of
-///             points. That keeps all powers of the eccentricity, where the usual near-circular
-///             series drop e^2.
+///             mean over M (the convention of Brouwer 1959). The variation is the integral of
+///             Gauss's equations along the mean orbit, less its average: a sum over equally spaced
+///             points of one turn, which for a periodic function converges faster than any power of
+///             their number. That keeps all powers of the eccentricity, where the usual
+///             near-circular series drop e^2.
 /// Valid for   e < 0.05; there 16 points reach 1e-4 of the variation. Left out are J2^2 (metres,
-/// but
-///             common to both spacecraft of a formation) and all higher harmonics.
+///             but common to both spacecraft of a formation) and all higher harmonics.
 /// Checked by  test_suites/unit/flight_sw/mean_elements_test.cpp
 #pragma once
 

@@ -1,9 +1,8 @@
 /// Quasi-nonsingular relative orbital elements (ROE), how they drift and what impulses do to them.
 ///
 /// Elements    a_roe = a_chief * (da, dl, dex, dey, dix, diy) [m], of mean elements: D'Amico
-/// (2010),
-///             da = (a_D - a_C)/a_C, dl = u_D - u_C + (RAAN_D - RAAN_C) cos i_C, diy = dRAAN sin
-///             i_C.
+///             (2010), da = (a_D - a_C)/a_C, dl = u_D - u_C + (RAAN_D - RAAN_C) cos i_C, diy =
+///             dRAAN sin i_C.
 /// Drift       State transition matrix under J2 of Koenig, Guffanti & D'Amico, JGCD 40(7), 2017.
 /// Impulses    Gauss's equations in these elements: RTN of the spacecraft that burns, [m/s] -> [m].
 /// Valid for   separations far below a; the maps to and from RTN are for e < 0.01 (first order).

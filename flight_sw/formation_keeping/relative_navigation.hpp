@@ -1,19 +1,18 @@
 /// Estimates where the deputy is relative to the chief, from GNSS fixes of both.
 ///
 /// State       a_roe [m] of the deputy (mean elements), and the chief's own mean orbit, each a
-/// Gaussian. Dynamics    J2 state transition; noise of the relative (and absolute) acceleration,
-/// white; own burns
-///             enter at mid-burn through the control input matrix, with an execution error.
-/// Measurement Both fixes of one epoch become mean elements; their difference measures a_roe
-/// directly.
-///             What the two share (Earth orientation, lever arm, broadcast orbits) cancels.
+///             Gaussian.
+/// Dynamics    J2 state transition; noise of the relative (and absolute) acceleration, white; own
+///             burns enter at mid-burn through the control input matrix, with an execution error.
+/// Measuring   Both fixes of one epoch become mean elements; their difference measures a_roe
+///             directly. What the two share (Earth orientation, lever arm, broadcast orbits)
+///             cancels. The lever arm of (0.05, 0, 0.10) m is not taken off: two spacecraft that
+///             point at the zenith carry it alike, to 1e-4 of it.
 /// Lateness    The filter stays `lag_s` behind and takes measurements in the order of their epochs,
-/// so
-///             messages that overtake each other on the way do not matter. Its answer for the
+///             so messages that overtake each other on the way do not matter. Its answer for the
 ///             present is the filtered state moved forward over burns and drift.
 /// Trust       An update whose innovation is impossible is left out. Three in a row mean that the
-/// state
-///             is wrong: first a burn that did not happen (or not fully) is suspected and the
+///             state is wrong: first a burn that did not happen (or not fully) is suspected and the
 ///             covariance opened in the direction of its effect, then everything.
 /// Memory      Fixed arrays; no allocation.
 /// Checked by  test_suites/unit/flight_sw/relative_navigation_test.cpp

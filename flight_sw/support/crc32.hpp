@@ -28,4 +28,8 @@ inline std::uint32_t crc32_novatel(const unsigned char* data, std::size_t bytes)
   return crc32_update(0u, data, bytes);
 }
 
+inline std::uint32_t crc32_common(const unsigned char* data, std::size_t bytes) {
+  return crc32_update(0xFFFFFFFFu, data, bytes) ^ 0xFFFFFFFFu;
+}
+
 }  // namespace flight_support
