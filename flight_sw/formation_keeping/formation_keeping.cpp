@@ -161,7 +161,7 @@ void FormationKeeping::handle_fix(std::int64_t now_ns, const GnssFix& fix) {
   const std::int64_t telemetry_slot = fix.epoch_ns / nanoseconds(configuration_.telemetry_period_s);
   const bool telemetry_due = telemetry_slot != last_telemetry_slot_;
   last_telemetry_slot_ = telemetry_slot;
-  if (navigation_.has_started() && fix.epoch_ns >= navigation_.epoch_ns()) {
+  if (navigation_.can_predict(fix.epoch_ns)) {
     const FormationState state = navigation_.at(fix.epoch_ns);
     send_estimate(state);
     if (telemetry_due) send_telemetry(fix.epoch_ns, &state);
@@ -240,7 +240,7 @@ std::int32_t FormationKeeping::tick(std::int64_t now_ns) {
 void FormationKeeping::decide(std::int64_t now_ns) {
   constexpr std::int64_t kRetry_ns = 60 * kSecond_ns;
   navigation_.process(now_ns);
-  if (!navigation_.has_started() || now_ns < navigation_.epoch_ns()) {
+  if (!navigation_.can_predict(now_ns)) {
     host_.request_tick(now_ns + kRetry_ns);
     return;
   }

@@ -18,6 +18,10 @@ constexpr double kMaxStep_s = 300.0;
 constexpr double kReopened_r_m = 50.0;
 constexpr double kReopened_v_mps = 0.1;
 constexpr int kOutliersToDistrust = 3;
+// Own fixes that step back this far come from a receiver that found another time, and replace the
+// old.
+constexpr double kReceiverRestart_s = 60.0;
+constexpr double kLongestPrediction_s = 86400.0;
 
 // Noise of one state, position and velocity per axis, as noise of the elements [m^2].
 Matrix6 element_covariance(double u_rad, double n_radps, double variance_r, double variance_v) {
@@ -53,7 +57,11 @@ RelativeNavigation::TimedElements RelativeNavigation::mean_of(const GnssFix& fix
 }
 
 bool RelativeNavigation::add_own_fix(const GnssFix& fix) {
-  if (own_count_ > 0 && fix.epoch_ns <= own_[own_newest_].t_ns) return false;
+  if (own_count_ > 0 && fix.epoch_ns <= own_[own_newest_].t_ns) {
+    if (own_[own_newest_].t_ns - fix.epoch_ns < nanoseconds(kReceiverRestart_s)) return false;
+    own_count_ = 0;
+    own_newest_ = -1;
+  }
   own_newest_ = (own_newest_ + 1) % kOwnFixes;
   own_[own_newest_] = mean_of(fix);
   if (own_count_ < kOwnFixes) ++own_count_;
@@ -173,8 +181,12 @@ void RelativeNavigation::measure_relative(const RelativeElements& z, const Matri
   if (measure(&state_.relative, z, R, options_.gate)) ++updates_;
 }
 
+bool RelativeNavigation::can_predict(std::int64_t t_ns) const {
+  return started_ && t_ns >= state_.t_ns && t_ns - state_.t_ns <= nanoseconds(kLongestPrediction_s);
+}
+
 FormationState RelativeNavigation::at(std::int64_t t_ns) const {
-  assert(started_ && t_ns >= state_.t_ns);
+  assert(can_predict(t_ns));
   FormationState state = state_;
   advance(&state, t_ns);
   return state;

@@ -55,7 +55,8 @@ class RelativeNavigation {
  public:
   explicit RelativeNavigation(const NavigationOptions& options) : options_(options) {}
 
-  /// Takes a fix of this spacecraft. @return false if it is no newer than the last one.
+  /// Takes a fix of this spacecraft. @return false if it is no newer than the last one (but a step
+  /// back of a minute or more is a receiver that starts anew, and taken).
   bool add_own_fix(const GnssFix& fix);
   /// Takes a fix of the chief, in any order.
   /// @return false if it is too old to be of use, or has been taken before.
@@ -66,7 +67,11 @@ class RelativeNavigation {
   void process(std::int64_t now_ns);
 
   bool has_started() const { return started_; }
-  /// The state at `t_ns`, with known burns up to then. Requires has_started(), t_ns >= epoch_ns().
+  /// Is at() possible: has the filter started, and is `t_ns` between its epoch and a day later?
+  /// Beyond that an estimate means nothing, and a clock that jumped must not cost hours of
+  /// computing.
+  bool can_predict(std::int64_t t_ns) const;
+  /// The state at `t_ns`, with known burns up to then. Requires can_predict(t_ns).
   FormationState at(std::int64_t t_ns) const;
   /// Epoch of the last measurement used.
   std::int64_t epoch_ns() const { return state_.t_ns; }

@@ -163,6 +163,24 @@ TEST(RelativeNavigationTest, ADuplicateFixIsRefused) {
   EXPECT_FALSE(navigation.add_chief_fix(chief));  // used
 }
 
+// A receiver that shows a time years ahead for once, with a sound CRC: the next right fix is taken
+// again.
+TEST(RelativeNavigationTest, AReceiverThatFindsAnotherTimeIsFollowed) {
+  TwoSpacecraft truth(roe(0, 0, 0, 300, 0, 300), 5);
+  RelativeNavigation navigation{NavigationOptions()};
+  take_prompt(&truth, &navigation, 60);
+  GnssFix lost_in_time = truth.deputy_fix();
+  lost_in_time.epoch_ns += 1024 * kWeek_ns;
+  EXPECT_TRUE(navigation.add_own_fix(lost_in_time));
+  EXPECT_FALSE(navigation.can_predict(lost_in_time.epoch_ns));
+  const std::uint32_t updates = navigation.updates();
+  take_prompt(&truth, &navigation, 60);
+  // Sixty epochs, of which the filter's lag holds back the last three, as it did before; those
+  // three of before have lost their own fixes.
+  EXPECT_EQ(navigation.updates(), updates + 57);
+  EXPECT_EQ(navigation.outliers(), 0u);
+}
+
 // Half an hour without the chief: the estimate coasts on J2, and its error stays what its
 // covariance says.
 TEST(RelativeNavigationTest, ABlackoutCostsAccuracyNotTrust) {
