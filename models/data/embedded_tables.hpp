@@ -11,4 +11,10 @@ namespace orrery::embedded {
 /// GGM05S to degree and order 60, ICGEM layout; read it with GravityField::parse.
 std::string_view ggm05s_d60();
 
+/// NRLMSISE-00, the arrays of the published model; read by models/atmosphere.
+std::string_view nrlmsise00_coefficients();
+
+/// Monthly means of F10.7 and Ap, 2014 to 2025; read with SpaceWeather::monthly.
+std::string_view space_weather_monthly();
+
 }  // namespace orrery::embedded
