@@ -4,12 +4,14 @@
  * Relative orbital elements are mean, quasi-nonsingular, scaled by the chief's semi-major axis [m]:
  *   a*da, a*dl, a*dex, a*dey, a*dix, a*diy   (D'Amico 2010; dl = du + dRAAN cos i)
  *
- *   command    0 u8 opcode | 1 f64 a_roe_m[6] | 49 i64 end_ns | 57 u32 crc          ground ->
- * deputy RECONFIGURE: be at a_roe_m at end_ns, then hold it. HALT: drop the goal and coast; a_roe_m
- * and end_ns are ignored, the length is the same. telemetry  0 i64 t_ns | 8 u32 mode | 12 f64
- * a_roe_m[6] | 60 f64 sigma_m[6] | 108 f64 delta_v_mps | 116 u32 burns | 120 u32 updates | 124 u32
- * outliers | 128 u32 rejected   deputy -> ground a_roe_m and sigma_m are zero until relative
- * navigation has started.
+ *   command, ground -> deputy
+ *     0 u8 opcode | 1 f64 a_roe_m[6] | 49 i64 end_ns | 57 u32 crc
+ *     RECONFIGURE: be at a_roe_m at end_ns, then hold it.
+ *     HALT: drop the goal and coast; same length, a_roe_m and end_ns are ignored.
+ *   telemetry, deputy -> ground
+ *     0 i64 t_ns | 8 u32 mode | 12 f64 a_roe_m[6] | 60 f64 sigma_m[6] | 108 f64 delta_v_mps
+ *     116 u32 burns | 120 u32 updates | 124 u32 outliers | 128 u32 rejected
+ *     a_roe_m and sigma_m are zero until relative navigation has started.
  *
  * crc is the common CRC-32 (zlib) of the bytes before it.
  */

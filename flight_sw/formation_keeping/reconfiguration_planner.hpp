@@ -44,8 +44,7 @@ class ReconfigurationPlanner {
   /// @param miss  What to make up at the goal's end [m]: predicted_miss(), or zero in elements that
   ///              shall be left alone.
   /// @return false if the window has no opportunity, the impulse limit cannot be kept, or no plan
-  /// is
-  ///         as safe as the options ask (or as the present state, where that is less).
+  ///         is as safe as the options ask (or as the present state, where that is less).
   bool plan(const FormationState& now, const Goal& goal, const RelativeElements& miss,
             const BurnWindow& window, Plan* plan) const;
 
