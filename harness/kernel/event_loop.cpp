@@ -67,8 +67,8 @@ const std::string& EventLoop::owner_name(OwnerId id) const {
 
 EventHandle EventLoop::schedule(SimTime t, const EventSpec& spec, Action action) {
   if (t < now_) throw std::invalid_argument(before_now("schedule", t, now_));
-  require_owner(spec.destination, "destination");
-  require_owner(spec.origin, "origin");
+  if (spec.destination >= owners_.size()) throw_no_owner("destination", spec.destination);
+  if (spec.origin >= owners_.size()) throw_no_owner("origin", spec.origin);
   if (spec.kind == nullptr) throw std::invalid_argument("EventLoop::schedule: kind is null");
   Owner& origin = owners_[spec.origin];
   std::uint64_t& counter = spec.phase == Phase::kRecorder ? origin.recorded : origin.scheduled;
@@ -117,8 +117,7 @@ void EventLoop::fingerprint_payload(Bytes payload) {
   if (in_fingerprint_) fingerprint_.payload(current_owner_, payload);
 }
 
-void EventLoop::require_owner(OwnerId id, const char* role) const {
-  if (id < owners_.size()) return;
+void EventLoop::throw_no_owner(const char* role, OwnerId id) const {
   throw std::invalid_argument("EventLoop::schedule: " + std::string(role) + " = " +
                               std::to_string(id) + ", there are " + std::to_string(owners_.size()) +
                               " owners");

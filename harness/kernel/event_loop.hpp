@@ -81,7 +81,7 @@ class EventLoop {
   };
   class Running;
 
-  void require_owner(OwnerId id, const char* role) const;
+  [[noreturn]] void throw_no_owner(const char* role, OwnerId id) const;
   void require_between_events(const char* function) const;
   void move_to(SimTime t);
 

@@ -7,13 +7,16 @@
 namespace orrery {
 namespace {
 
-constexpr std::size_t kArity = 4;
-
-std::size_t parent(std::size_t i) {
-  return (i - 1) / kArity;
+std::size_t first_child(std::size_t position) {
+  return 4 * (position - 2);
 }
-std::size_t first_child(std::size_t i) {
-  return kArity * i + 1;
+std::size_t parent(std::size_t position) {
+  return position / 4 + 2;
+}
+
+[[noreturn]] void throw_in_the_past(SimTime t, SimTime last_popped) {
+  throw std::invalid_argument("EventQueue::push: t = " + to_string(t) +
+                              " is before the last popped event, " + to_string(last_popped));
 }
 
 // Monotone in (phase, destination, origin): a larger key never gets a smaller tie. Origins from 255
@@ -25,104 +28,57 @@ std::uint32_t tie_of(const EventKey& key) {
 
 }  // namespace
 
-bool EventQueue::before(const Entry& a, const Entry& b) const {
+bool EventQueue::before(Entry a, Entry b) const {
   if (a.t_ns != b.t_ns) [[likely]] {
     return a.t_ns < b.t_ns;
   }
-  return a.tie != b.tie ? a.tie < b.tie : tied_before(a, b);
+  return a.tie() != b.tie() ? a.tie() < b.tie() : tied_before(a, b);
 }
 
-bool EventQueue::tied_before(const Entry& a, const Entry& b) const {
-  const Slot& slot_a = slots_[a.slot];
-  const Slot& slot_b = slots_[b.slot];
+bool EventQueue::tied_before(Entry a, Entry b) const {
+  const Slot& slot_a = slots_[a.slot()];
+  const Slot& slot_b = slots_[b.slot()];
   return slot_a.origin != slot_b.origin ? slot_a.origin < slot_b.origin
                                         : slot_a.counter < slot_b.counter;
 }
 
-EventHandle EventQueue::push(const EventKey& key, const EventKind* kind, Action action) {
-  if (key.t < last_popped_) {
-    throw std::invalid_argument("EventQueue::push: t = " + to_string(key.t) +
-                                " is before the last popped event, " + to_string(last_popped_));
-  }
-  if (!action) throw std::invalid_argument("EventQueue::push: the action is empty");
-  const std::uint32_t index = take_slot();
-  Slot& slot = slots_[index];
-  slot.action = std::move(action);
-  slot.kind = kind;
-  slot.counter = key.counter;
-  slot.origin = key.origin;
-  const Entry entry{to_ns(key.t), tie_of(key), index};
-  heap_.push_back(entry);
-  lift(heap_.size() - 1, entry);
-  return {index, slot.generation};
-}
-
-bool EventQueue::pop(SimTime latest, Event& event) {
-  while (!heap_.empty() && heap_.front().t_ns <= to_ns(latest)) {
-    const Entry top = heap_.front();
-    Slot& slot = slots_[top.slot];
-    // The slot is a random place of a large pool: let it come while the heap is put in order.
-    __builtin_prefetch(&slot);
-    __builtin_prefetch(&slot.generation);
-    remove_top();
-    if (!slot.action) {
-      --dead_;
-      free_slot(top.slot);
-      continue;
-    }
-    last_popped_ = from_ns(top.t_ns);
-    event.key = {last_popped_, static_cast<Phase>(top.tie >> 24),
-                 static_cast<OwnerId>(top.tie >> 8 & 0xffff), slot.origin, slot.counter};
-    event.kind = slot.kind;
-    event.action = std::move(slot.action);
-    ++slot.generation;
-    free_slot(top.slot);
-    compact_if_mostly_dead();
-    return true;
-  }
-  return false;
-}
-
-bool EventQueue::cancel(EventHandle handle) {
-  if (handle.slot >= slots_.size()) return false;
-  Slot& slot = slots_[handle.slot];
-  if (slot.generation != handle.generation || !slot.action) return false;
-  // Destroyed on return, when the queue is whole again: captures may have destructors.
-  const Action cancelled = std::move(slot.action);
-  ++slot.generation;
-  ++dead_;
-  compact_if_mostly_dead();
-  return true;
-}
-
-std::optional<SimTime> EventQueue::next_time() {
-  while (!heap_.empty() && !slots_[heap_.front().slot].action) {
-    --dead_;
-    free_slot(heap_.front().slot);
-    remove_top();
-  }
-  if (heap_.empty()) return std::nullopt;
-  return from_ns(heap_.front().t_ns);
-}
-
 std::size_t EventQueue::earliest_child(std::size_t first, std::size_t end) const {
   std::size_t best = first;
-  for (std::size_t i = first + 1; i < end; ++i) best = before(heap_[i], heap_[best]) ? i : best;
+  for (std::size_t i = first + 1; i < end; ++i) {
+    if (before(heap_[i], heap_[best])) best = i;
+  }
   return best;
 }
 
-void EventQueue::lift(std::size_t hole, const Entry& entry) {
-  while (hole > 0 && before(entry, heap_[parent(hole)])) {
+// Which of four is the earliest is a coin toss to the branch predictor, so the choice is
+// arithmetic. Equal instants, which need the rest of the key, are one branch that is seldom taken.
+std::size_t EventQueue::earliest_of_four(std::size_t first) const {
+  const Entry* entry = heap_.data() + first;
+  const std::size_t left = entry[1].t_ns < entry[0].t_ns ? 1 : 0;
+  const std::size_t right = entry[3].t_ns < entry[2].t_ns ? 3 : 2;
+  const std::int64_t t_left = entry[left].t_ns;
+  const std::int64_t t_right = entry[right].t_ns;
+  const bool tied =
+      (entry[0].t_ns == entry[1].t_ns) | (entry[2].t_ns == entry[3].t_ns) | (t_left == t_right);
+  if (tied) [[unlikely]] {
+    return earliest_child(first, first + 4);
+  }
+  const std::size_t all_ones_if_right = -static_cast<std::size_t>(t_right < t_left);
+  return first + (left ^ ((left ^ right) & all_ones_if_right));
+}
+
+void EventQueue::lift(std::size_t hole, Entry entry) {
+  while (hole != kRoot && before(entry, heap_[parent(hole)])) {
     heap_[hole] = heap_[parent(hole)];
     hole = parent(hole);
   }
   heap_[hole] = entry;
 }
 
-void EventQueue::sink(std::size_t hole, const Entry& entry) {
+void EventQueue::sink(std::size_t hole, Entry entry) {
   while (first_child(hole) < heap_.size()) {
     const std::size_t first = first_child(hole);
-    const std::size_t child = earliest_child(first, std::min(first + kArity, heap_.size()));
+    const std::size_t child = earliest_child(first, std::min(first + 4, heap_.size()));
     if (!before(heap_[child], entry)) break;
     heap_[hole] = heap_[child];
     hole = child;
@@ -133,19 +89,28 @@ void EventQueue::sink(std::size_t hole, const Entry& entry) {
 void EventQueue::remove_top() {
   const Entry last = heap_.back();
   heap_.pop_back();
-  const std::size_t size = heap_.size();
-  if (size == 0) return;
-  std::size_t hole = 0;
-  std::size_t first = 1;
-  // Whole groups first: with a constant number of children the loop below unrolls.
-  while (first + kArity <= size) {
-    const std::size_t child = earliest_child(first, first + kArity);
+  const std::size_t end = heap_.size();
+  if (end == kRoot) return;
+  std::size_t hole = kRoot;
+  std::size_t first = first_child(kRoot);
+  while (first + 4 <= end) {
+    // The children of all four, before it is known whose are needed: in a heap larger than the
+    // caches each level would otherwise wait for memory.
+    const std::size_t next = first_child(first);
+    if (next + 16 <= end) {
+      const Entry* line = heap_.data() + next;
+      __builtin_prefetch(line);
+      __builtin_prefetch(line + 4);
+      __builtin_prefetch(line + 8);
+      __builtin_prefetch(line + 12);
+    }
+    const std::size_t child = earliest_of_four(first);
     heap_[hole] = heap_[child];
     hole = child;
     first = first_child(hole);
   }
-  if (first < size) {
-    const std::size_t child = earliest_child(first, size);
+  if (first < end) {
+    const std::size_t child = earliest_child(first, end);
     heap_[hole] = heap_[child];
     hole = child;
   }
@@ -171,21 +136,83 @@ void EventQueue::free_slot(std::uint32_t index) {
   first_free_ = index;
 }
 
-void EventQueue::compact_if_mostly_dead() {
-  if (2 * dead_ <= heap_.size()) return;
-  const auto dead = std::remove_if(heap_.begin(), heap_.end(), [this](const Entry& entry) {
-    if (slots_[entry.slot].action) return false;
-    free_slot(entry.slot);
+EventHandle EventQueue::push(const EventKey& key, const EventKind* kind, Action&& action) {
+  if (key.t < last_popped_) throw_in_the_past(key.t, last_popped_);
+  if (!action) throw std::invalid_argument("EventQueue::push: the action is empty");
+  const std::uint32_t index = take_slot();
+  Slot& slot = slots_[index];
+  slot.action = std::move(action);
+  slot.kind = kind;
+  slot.counter = key.counter;
+  slot.origin = key.origin;
+  const Entry entry{to_ns(key.t), std::uint64_t{tie_of(key)} << 32 | index};
+  heap_.push_back(entry);
+  lift(heap_.size() - 1, entry);
+  return {index, slot.generation};
+}
+
+bool EventQueue::pop(SimTime latest, Event& event) {
+  while (entries() != 0 && heap_[kRoot].t_ns <= to_ns(latest)) {
+    const Entry top = heap_[kRoot];
+    Slot& slot = slots_[top.slot()];
+    remove_top();
+    if (!slot.action) {
+      --dead_;
+      free_slot(top.slot());
+      continue;
+    }
+    // The next event's slot is a random place of a large pool: let it come while this one runs.
+    if (entries() != 0) {
+      const Slot& next = slots_[heap_[kRoot].slot()];
+      __builtin_prefetch(&next);
+      __builtin_prefetch(&next.generation);
+    }
+    last_popped_ = from_ns(top.t_ns);
+    event.key = {last_popped_, static_cast<Phase>(top.tie() >> 24),
+                 static_cast<OwnerId>(top.tie() >> 8 & 0xffff), slot.origin, slot.counter};
+    event.kind = slot.kind;
+    event.action = std::move(slot.action);
+    ++slot.generation;
+    free_slot(top.slot());
+    if (2 * dead_ > entries()) compact();
     return true;
-  });
-  heap_.erase(dead, heap_.end());
-  dead_ = 0;
-  // Floyd: sink every parent, the last one first.
-  if (heap_.size() < 2) return;
-  for (std::size_t i = parent(heap_.size() - 1) + 1; i-- > 0;) {
-    const Entry entry = heap_[i];
-    sink(i, entry);
   }
+  return false;
+}
+
+bool EventQueue::cancel(EventHandle handle) {
+  if (handle.slot >= slots_.size()) return false;
+  Slot& slot = slots_[handle.slot];
+  if (slot.generation != handle.generation || !slot.action) return false;
+  // Destroyed on return, when the queue is whole again: captures may have destructors.
+  const Action cancelled = std::move(slot.action);
+  ++slot.generation;
+  ++dead_;
+  if (2 * dead_ > entries()) compact();
+  return true;
+}
+
+std::optional<SimTime> EventQueue::next_time() {
+  while (entries() != 0 && !slots_[heap_[kRoot].slot()].action) {
+    --dead_;
+    free_slot(heap_[kRoot].slot());
+    remove_top();
+  }
+  if (entries() == 0) return std::nullopt;
+  return from_ns(heap_[kRoot].t_ns);
+}
+
+void EventQueue::compact() {
+  const auto is_dead = [this](Entry entry) {
+    if (slots_[entry.slot()].action) return false;
+    free_slot(entry.slot());
+    return true;
+  };
+  heap_.erase(std::remove_if(heap_.begin() + kRoot, heap_.end(), is_dead), heap_.end());
+  dead_ = 0;
+  if (entries() < 2) return;
+  // Floyd (1964): sink every parent, the last one first.
+  for (std::size_t i = parent(heap_.size() - 1); i >= kRoot; --i) sink(i, heap_[i]);
 }
 
 }  // namespace orrery

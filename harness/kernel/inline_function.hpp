@@ -18,7 +18,8 @@ class InlineFunction;
 template <class R, class... Args, std::size_t kCapacity>
 class InlineFunction<R(Args...), kCapacity> {
  public:
-  InlineFunction() = default;
+  // Not defaulted: InlineFunction() would then fill the storage with zeros first.
+  InlineFunction() noexcept {}
 
   template <class F>
   requires(!std::is_same_v<std::remove_cvref_t<F>, InlineFunction> &&

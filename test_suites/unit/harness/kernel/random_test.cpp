@@ -93,6 +93,15 @@ TEST(RandomStreamTest, EveryDistributionTakesOneDraw) {
   EXPECT_EQ(stream.draws(), 9u);
 }
 
+// What keeps 0 and 1 out, which no sample would ever show.
+TEST(RandomStreamTest, UniformsAreOddMultiplesOfTwoToTheMinus53) {
+  RandomStream stream(6);
+  for (int i = 0; i < 1000; ++i) {
+    const auto multiple = static_cast<std::uint64_t>(stream.uniform() * 0x1p53);
+    EXPECT_EQ(multiple % 2, 1u);
+  }
+}
+
 TEST(RandomStreamTest, CertaintyAndImpossibilityAreExact) {
   RandomStream stream(2);
   for (int i = 0; i < 1000; ++i) {
@@ -245,15 +254,19 @@ TEST_P(RandomDistributionTest, IntegersAreEquallyLikely) {
   expect_equal_counts(counts);
 }
 
-// 3 * 2^62 does not divide 2^64: a remainder would give the first third twice the others' share.
+// 3 * 2^62 does not divide 2^64: a remainder would give the first third twice the others' share,
+// and a product without rejection would give one residue of three twice the others'.
 TEST_P(RandomDistributionTest, IntegersOfAnAwkwardRangeAreUnbiased) {
   constexpr std::int64_t kThird = std::int64_t{1} << 62;
-  std::vector<int> counts(3);
+  std::vector<int> thirds(3);
+  std::vector<int> residues(3);
   for (int i = 0; i < kDraws; ++i) {
     const std::int64_t x = stream.integer(-kThird, 2 * (kThird - 1) + 1);
-    ++counts[x < 0 ? 0 : x < kThird ? 1 : 2];
+    ++thirds[x < 0 ? 0 : x < kThird ? 1 : 2];
+    ++residues[(static_cast<std::uint64_t>(x) + kThird) % 3];
   }
-  expect_equal_counts(counts);
+  expect_equal_counts(thirds);
+  expect_equal_counts(residues);
 }
 
 // Pairs of neighbours fill the square evenly: no correlation from draw to draw.
