@@ -62,6 +62,7 @@ class FlightComputer::Impl {
   void withdraw_tick();
   bool makes_progress();
   void bury();
+  void lose_what_waits();
   void tell(CallOutcome outcome);
   void warn(const std::string& line);
 
@@ -306,11 +307,14 @@ void FlightComputer::Impl::withdraw_tick() {
   tick_waits_ = false;
 }
 
-// The process is dead: nothing that was on its way in remains.
 void FlightComputer::Impl::bury() {
   ++crashes;
   ++life_;
   died_ = loop_.now();
+  lose_what_waits();
+}
+
+void FlightComputer::Impl::lose_what_waits() {
   withdraw_tick();
   loop_.cancel(free_event_);
   free_event_ = {};
@@ -341,12 +345,7 @@ void FlightComputer::Impl::shut_down() {
   if (outcome == CallOutcome::kCrashed) {
     bury();
   } else {
-    withdraw_tick();
-    loop_.cancel(free_event_);
-    free_event_ = {};
-    inputs_lost += waiting_.size();
-    for (const Waiting& w : waiting_) payloads_.give_back(w.payload);
-    waiting_.clear();
+    lose_what_waits();
   }
   tell(outcome);
 }

@@ -1,38 +1,22 @@
-#include <orrery/harness/flight/containment.hpp>
-#include <orrery/harness/flight/flight_library.hpp>
-#include <orrery/harness/flight/flight_process.hpp>
-#include <orrery/harness/flight/host_stopwatch.hpp>
+#include <orrery/harness/flight/flight_process_impl.hpp>
 #include <orrery/harness/flight/port_table.hpp>
 #include <orrery/harness/flight/stack_frames.hpp>
 
-#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <orrery_flight.h>
 #include <stdexcept>
 
 namespace orrery {
 namespace {
 
-using internal::SimulatorScope;
-
-enum class Call : std::uint8_t { kLoad, kCreate, kInput, kTick, kDestroy };
+using internal::CallArguments;
+using Call = internal::LibraryCall;
 
 const char* call_name(Call call) {
   static constexpr const char* kNames[] = {"load", "create", "input", "tick", "destroy"};
   return kNames[static_cast<int>(call)];
 }
-
-// What a call of the library needs, as plain data: the other side of the boundary reads it.
-struct Arguments {
-  Call call = Call::kLoad;
-  std::int64_t onboard_ns = 0;
-  const orrery_boot* boot = nullptr;
-  const FlightPort* port = nullptr;
-  std::uint32_t bytes = 0;
-  std::int32_t status = ORRERY_OK;  // result
-};
 
 void check_name(const char* what, const std::string& name) {
   if (name.empty() || name.find('/') != std::string::npos || name[0] == '.') {
@@ -41,86 +25,32 @@ void check_name(const char* what, const std::string& name) {
   }
 }
 
+void check_heap_limit(const char* function, std::uint64_t bytes) {
+  if (bytes > FirstFitHeap::kMaxLimit_bytes) {
+    throw std::invalid_argument(std::string(function) + ": heap limit = " + std::to_string(bytes) +
+                                " bytes is above " + std::to_string(FirstFitHeap::kMaxLimit_bytes));
+  }
+}
+
+// Also where heaps are not simulated: a mistake must not show under one preset only.
+void check_heap(const FlightProcessOptions& options) {
+  if (options.heap_alignment != 8 && options.heap_alignment != 16) {
+    throw std::invalid_argument("FlightProcess: heap_alignment = " +
+                                std::to_string(options.heap_alignment) + " bytes; it is 8 or 16");
+  }
+  check_heap_limit("FlightProcess", options.heap_bytes);
+}
+
 FirstFitOptions heap_options(const FlightProcessOptions& options) {
   return {.alignment = options.heap_alignment, .limit_bytes = options.heap_bytes};
 }
 
 }  // namespace
 
-class FlightProcess::Impl {
- public:
-  explicit Impl(FlightProcessOptions options);
-  ~Impl();
-
-  CallOutcome call(Arguments arguments, SimTime truth, Bytes data);
-  CallOutcome create(SimTime truth, std::int64_t onboard_ns, std::uint32_t boot_count,
-                     std::uint32_t reset_cause);
-  bool shut_down_library();
-  void require_alive(const char* function) const;
-  void require_between_calls(const char* function) const;
-  void die_of_last_call(SimTime truth);
-  void die(CrashKind kind, std::string message, SimTime truth, const Arguments& arguments);
-
-  // What the library may ask of the host, within a call.
-  std::int32_t output(std::uint32_t port, const void* data, std::uint32_t bytes);
-  void request_tick(std::int64_t at_ns);
-  void log(std::int32_t level, const char* line);
-  std::int32_t load_slot(std::uint32_t slot, void* buffer, std::uint32_t capacity);
-  std::int32_t store_slot(std::uint32_t slot, const void* data, std::uint32_t bytes);
-
-  FlightProcessOptions options;
-  std::string name;
-  std::vector<FlightPort> ports;
-  const orrery_flight* flight = nullptr;
-  std::unique_ptr<SimulatedHeap> heap;     // null where heaps are not simulated
-  std::unique_ptr<FlightLibrary> library;  // unloaded while the heap is still there
-
-  bool created = false, alive = false, crashed = false, ended = false;
-  CallRecord record;
-  CrashReport crash;
-  std::optional<std::int64_t> tick_request;
-  Storage storage;
-  internal::HostStopwatch stopwatch;
-
-  struct OutputRow {
-    std::uint32_t port;  // index
-    std::size_t begin, bytes;
-  };
-  std::vector<OutputRow> outputs;
-  ByteBuffer output_bytes;
-  struct LogRow {
-    LogLevel level;
-    std::size_t begin, bytes;
-  };
-  std::vector<LogRow> logs;
-  std::string log_text;
-
- private:
-  void load();
-  void begin_call();
-  void end_call(SimTime truth);
-  void run_library_call();
-  CallOutcome judge(const Arguments& arguments, SimTime truth);
-  void host_log(LogLevel level, std::string_view text);
-  void report_floating_point();
-  bool calling() const { return internal::running_process() == &contained_; }
-  std::uint32_t find_output(std::uint32_t id) const;
-  static void on_heap_fault(void* self, const HeapFault& fault);
-
-  internal::ContainedProcess contained_;
-  internal::CrashCapture capture_;
-  orrery_host host_{};
-  void* self_ = nullptr;
-  Arguments arguments_;
-  ByteBuffer input_;    // a copy, so that flight code cannot change the simulator's
-  ByteBuffer staging_;  // a store that may still fault
-  std::uint64_t allocations_before_ = 0;
-  bool reported_floating_point_ = false;
-};
-
 FlightProcess::Impl::Impl(FlightProcessOptions o) : options(std::move(o)) {
   check_name("spacecraft", options.spacecraft);
   check_name("process", options.process);
+  check_heap(options);
   name = process_name(options);
   contained_.name = name.c_str();
   if (internal::call_in_progress()) {
@@ -131,24 +61,7 @@ FlightProcess::Impl::Impl(FlightProcessOptions o) : options(std::move(o)) {
     heap->blocks().set_fault_handler(on_heap_fault, this);
     contained_.heap = heap.get();
   }
-  host_.size = sizeof host_;
-  host_.abi_version = ORRERY_ABI_VERSION;
-  host_.context = this;
-  host_.output = [](void* context, std::uint32_t port, const void* data, std::uint32_t bytes) {
-    return static_cast<Impl*>(context)->output(port, data, bytes);
-  };
-  host_.request_tick = [](void* context, std::int64_t at_ns) {
-    static_cast<Impl*>(context)->request_tick(at_ns);
-  };
-  host_.log = [](void* context, std::int32_t level, const char* line) {
-    static_cast<Impl*>(context)->log(level, line);
-  };
-  host_.nv_load = [](void* context, std::uint32_t slot, void* buffer, std::uint32_t capacity) {
-    return static_cast<Impl*>(context)->load_slot(slot, buffer, capacity);
-  };
-  host_.nv_store = [](void* context, std::uint32_t slot, const void* data, std::uint32_t bytes) {
-    return static_cast<Impl*>(context)->store_slot(slot, data, bytes);
-  };
+  fill_host_table();
   load();
 }
 
@@ -164,7 +77,7 @@ void FlightProcess::Impl::load() {
         "from orrery_flight.h, and with that symbol visible?");
   }
   begin_call();
-  arguments_ = Arguments{};
+  arguments_ = CallArguments{};
   if (!internal::run_contained(
           contained_, [](void* self) { static_cast<Impl*>(self)->run_library_call(); }, this,
           capture_)) {
@@ -212,7 +125,7 @@ bool FlightProcess::Impl::shut_down_library() {
 
 // Flight code from here on.
 void FlightProcess::Impl::run_library_call() {
-  Arguments& a = arguments_;
+  CallArguments& a = arguments_;
   switch (a.call) {
     case Call::kLoad: {
       using Entry = const orrery_flight* (*)();
@@ -251,7 +164,7 @@ CallOutcome FlightProcess::Impl::create(SimTime truth, std::int64_t onboard_ns,
   return call({.call = Call::kCreate, .onboard_ns = onboard_ns, .boot = &boot}, truth, {});
 }
 
-CallOutcome FlightProcess::Impl::call(Arguments arguments, SimTime truth, Bytes data) {
+CallOutcome FlightProcess::Impl::call(CallArguments arguments, SimTime truth, Bytes data) {
   input_.assign(data.begin(), data.end());
   arguments.bytes = static_cast<std::uint32_t>(data.size());
   arguments_ = arguments;
@@ -295,7 +208,7 @@ void FlightProcess::Impl::end_call(SimTime truth) {
   report_floating_point();
 }
 
-CallOutcome FlightProcess::Impl::judge(const Arguments& arguments, SimTime truth) {
+CallOutcome FlightProcess::Impl::judge(const CallArguments& arguments, SimTime truth) {
   const std::int32_t status = arguments.status;
   if (status == ORRERY_OK) return CallOutcome::kDone;
   const std::string returned = "it returned status " + std::to_string(status);
@@ -312,7 +225,7 @@ CallOutcome FlightProcess::Impl::judge(const Arguments& arguments, SimTime truth
 }
 
 void FlightProcess::Impl::die(CrashKind kind, std::string message, SimTime truth,
-                              const Arguments& arguments) {
+                              const CallArguments& arguments) {
   crash = CrashReport{};
   crash.spacecraft = options.spacecraft;
   crash.process = options.process;
@@ -387,89 +300,6 @@ void FlightProcess::Impl::on_heap_fault(void* self, const HeapFault& fault) {
   std::fprintf(stderr, "orrery: heap of %s, outside of its calls: %s\n", process.name.c_str(),
                message);
   std::abort();
-}
-
-// ---- callbacks. What reads or writes flight memory does so as flight code; the rest is simulator
-// code under SimulatorScope. A crash may leave them between any two lines.
-
-std::uint32_t FlightProcess::Impl::find_output(std::uint32_t id) const {
-  for (std::uint32_t i = 0; i < ports.size(); ++i) {
-    if (ports[i].direction == PortDirection::kOut && ports[i].id == id) return i;
-  }
-  return UINT32_MAX;
-}
-
-std::int32_t FlightProcess::Impl::output(std::uint32_t port, const void* data,
-                                         std::uint32_t bytes) {
-  if (!calling() || arguments_.call == Call::kDestroy || arguments_.call == Call::kLoad) {
-    return ORRERY_REJECTED;
-  }
-  const std::size_t begin = output_bytes.size();
-  const std::uint32_t index = find_output(port);
-  if (index == UINT32_MAX) return ORRERY_NOT_FOUND;
-  if (bytes > ports[index].max_bytes) return ORRERY_TOO_SMALL;
-  {
-    const SimulatorScope scope;
-    output_bytes.resize(begin + bytes);
-  }
-  if (bytes > 0) std::memcpy(output_bytes.data() + begin, data, bytes);
-  const SimulatorScope scope;
-  outputs.push_back({index, begin, bytes});
-  return ORRERY_OK;
-}
-
-void FlightProcess::Impl::request_tick(std::int64_t at_ns) {
-  if (calling() && arguments_.call != Call::kDestroy) tick_request = at_ns;
-}
-
-void FlightProcess::Impl::log(std::int32_t level, const char* line) {
-  constexpr std::size_t kMostCharacters = 1000;
-  if (!calling()) return;
-  const std::size_t length = line == nullptr ? 0 : strnlen(line, kMostCharacters);
-  const std::size_t begin = log_text.size();
-  {
-    const SimulatorScope scope;
-    log_text.resize(begin + length);
-  }
-  if (length > 0) std::memcpy(log_text.data() + begin, line, length);
-  const SimulatorScope scope;
-  logs.push_back({static_cast<LogLevel>(std::clamp(level, ORRERY_DEBUG + 0, ORRERY_ERROR + 0)),
-                  begin, length});
-}
-
-std::int32_t FlightProcess::Impl::load_slot(std::uint32_t slot, void* buffer,
-                                            std::uint32_t capacity) {
-  if (!calling()) return ORRERY_REJECTED;
-  for (const auto& [number, content] : storage) {
-    if (number != slot) continue;
-    if (content.size() > capacity) return ORRERY_TOO_SMALL;
-    if (!content.empty()) std::memcpy(buffer, content.data(), content.size());
-    return static_cast<std::int32_t>(content.size());
-  }
-  return ORRERY_NOT_FOUND;
-}
-
-std::int32_t FlightProcess::Impl::store_slot(std::uint32_t slot, const void* data,
-                                             std::uint32_t bytes) {
-  if (!calling()) return ORRERY_REJECTED;
-  std::uint64_t others = 0;
-  for (const auto& [number, content] : storage) others += number == slot ? 0 : content.size();
-  if (others + bytes > options.storage_bytes) return ORRERY_TOO_SMALL;
-  {
-    const SimulatorScope scope;
-    staging_.resize(bytes);
-  }
-  if (bytes > 0) std::memcpy(staging_.data(), data, bytes);
-  const SimulatorScope scope;
-  const auto place = std::lower_bound(
-      storage.begin(), storage.end(), slot,
-      [](const auto& entry, std::uint32_t number) { return entry.first < number; });
-  if (place != storage.end() && place->first == slot) {
-    place->second = staging_;
-  } else {
-    storage.insert(place, {slot, staging_});
-  }
-  return ORRERY_OK;
 }
 
 // ---- the public face
@@ -556,6 +386,7 @@ HeapFigures FlightProcess::heap() const {
   return impl_->heap == nullptr ? HeapFigures{} : impl_->heap->blocks().figures();
 }
 void FlightProcess::set_heap_limit(std::uint64_t bytes) {
+  check_heap_limit("FlightProcess::set_heap_limit", bytes);
   impl_->options.heap_bytes = bytes;
   if (impl_->heap != nullptr) impl_->heap->set_limit(bytes);
 }

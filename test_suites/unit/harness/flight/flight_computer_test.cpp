@@ -1,4 +1,5 @@
 #include <orrery/harness/flight/flight_computer.hpp>
+#include <orrery/harness/heap/simulated_heap.hpp>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -217,15 +218,41 @@ TEST_F(FlightComputerTest, CrashDiscardsOutputsThatHadNotLeftAndInputsThatWaited
   EXPECT_EQ(computer_->inputs_lost(), 1u);
 }
 
-TEST_F(FlightComputerTest, OutputsOfADeadProcessStay) {
+TEST_F(FlightComputerTest, OutputsThatHadNotLeftDieWithTheProcess) {
   fly({.execution_time = 30us});
+  at(50us, order("D"));  // its destroy will crash
   at(100us, order("enever leaves"));
-  loop_.schedule(kStart + 110us, {Phase::kFault, test_, test_, &kTell},
-                 [this] { computer_->set_heap_limit(0); });
-  run_for(105us);
-  ASSERT_TRUE(computer_->alive());
+  run_for(110us);
+  computer_->shut_down();
   run_for(1ms);
-  EXPECT_THAT(notes_, ElementsAre("130 never leaves"));  // a limit alone kills nobody
+  EXPECT_THAT(notes_, IsEmpty());
+  EXPECT_EQ(computer_->outputs_discarded(), 1u);
+  ASSERT_EQ(crashes_.size(), 1u);
+  EXPECT_EQ(crashes_[0].call, "destroy");
+}
+
+// The simulator is made to allocate from a heap that counts; that is there first and goes last.
+TEST(FlightComputerSteadyStateTest, MessagesAllocateNothing) {
+  if (!heap_simulation_available()) GTEST_SKIP() << "a sanitizer owns malloc";
+  SimulatedHeap counting({.limit_bytes = 1 << 20});
+  EventLoop loop(kStart);
+  const OwnerId owner = loop.add_owner("dsc");
+  FlightComputer computer(loop, owner, {.spacecraft = "dsc", .library = "flight_test_subject"}, {});
+  const ByteBuffer message = order("eeverything has its buffer by now");
+  const HeapGuard guard(&counting);
+  computer.boot();
+  const auto exchange = [&](int messages) {
+    for (int i = 0; i < messages; ++i) {
+      computer.deliver("do", message, owner);
+      loop.run_until(loop.now() + 1us);
+    }
+  };
+  exchange(100);
+  const std::uint64_t before = counting.blocks().allocations();
+  EXPECT_GT(before, 0u);
+  exchange(1000);
+  EXPECT_EQ(counting.blocks().allocations(), before);
+  EXPECT_EQ(computer.calls(), 1101u);
 }
 
 TEST_F(FlightComputerTest, ExceptionOfAHookPassesThroughTheLoop) {

@@ -17,7 +17,7 @@ static struct {
   void* kept[64];
   int kept_count;
   int64_t period_ns; /* of the tick; 0: it asks for none */
-  uint32_t ticks;
+  int crashes_in_destroy;
 } subject;
 
 static const orrery_port ports[] = {{DO, ORRERY_IN, ORRERY_PACKET, "do", 64},
@@ -46,7 +46,7 @@ NOINLINE static int overflow(volatile char* above) {
 static volatile int zero = 0;
 static int* volatile nowhere = 0;
 
-NOINLINE static void fault(char how) {
+NOINLINE __attribute__((no_sanitize("undefined"))) static void fault(char how) {
   char local[64];
   char* volatile block = (char*)malloc(40);
   memset(local, 0xFF, sizeof local); /* no plausible header of a block */
@@ -100,7 +100,7 @@ NOINLINE static void fault(char how) {
 
 static int32_t create(void** self, const orrery_host* host, const orrery_boot* boot) {
   unsigned char message[8];
-  (void)self;
+  *self = (void*)host; /* by instance, also where the table below is shared */
   subject.host = host;
   if (boot->config_bytes > 0 && memcmp(boot->config, "refuse", 6) == 0) return ORRERY_FATAL;
   if (boot->config_bytes > 0 && memcmp(boot->config, "say", 3) == 0) {
@@ -117,7 +117,7 @@ static int32_t create(void** self, const orrery_host* host, const orrery_boot* b
 
 static int32_t input(void* self, int64_t now_ns, uint32_t port, const void* data, uint32_t bytes) {
   const unsigned char* order = (const unsigned char*)data;
-  (void)self;
+  subject.host = (const orrery_host*)self;
   if (port == BITS) {
     say(data, bytes);
     return ORRERY_OK;
@@ -158,6 +158,9 @@ static int32_t input(void* self, int64_t now_ns, uint32_t port, const void* data
     case 'z': /* give back the newest */
       free(subject.kept[--subject.kept_count]);
       break;
+    case 'D':
+      subject.crashes_in_destroy = 1;
+      break;
     case 'l': /* log */
       subject.host->log(subject.host->context, ORRERY_WARNING, (const char*)order + 1);
       break;
@@ -195,8 +198,7 @@ static int32_t input(void* self, int64_t now_ns, uint32_t port, const void* data
 }
 
 static int32_t tick(void* self, int64_t now_ns) {
-  (void)self;
-  subject.ticks++;
+  subject.host = (const orrery_host*)self;
   say_time('t', now_ns);
   if (subject.period_ns != 0) {
     subject.host->request_tick(subject.host->context, now_ns + subject.period_ns);
@@ -205,9 +207,10 @@ static int32_t tick(void* self, int64_t now_ns) {
 }
 
 static void destroy(void* self) {
-  (void)self;
+  subject.host = (const orrery_host*)self;
   subject.host->log(subject.host->context, ORRERY_INFO, "destroyed");
   say("out of turn", 11);
+  if (subject.crashes_in_destroy) fault('s');
   while (subject.kept_count > 0) free(subject.kept[--subject.kept_count]);
 }
 

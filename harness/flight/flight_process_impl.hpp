@@ -1,0 +1,107 @@
+/// The inside of a flight process: its state, the calls into the library and those back into the
+/// host.
+#pragma once
+
+#include <orrery/harness/flight/containment.hpp>
+#include <orrery/harness/flight/flight_library.hpp>
+#include <orrery/harness/flight/flight_process.hpp>
+#include <orrery/harness/flight/host_stopwatch.hpp>
+
+#include <cstdint>
+#include <memory>
+#include <orrery_flight.h>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace orrery {
+namespace internal {
+
+enum class LibraryCall : std::uint8_t { kLoad, kCreate, kInput, kTick, kDestroy };
+
+// What a call of the library needs, as plain data: the other side of the boundary reads it.
+struct CallArguments {
+  LibraryCall call = LibraryCall::kLoad;
+  std::int64_t onboard_ns = 0;
+  const orrery_boot* boot = nullptr;
+  const FlightPort* port = nullptr;
+  std::uint32_t bytes = 0;
+  std::int32_t status = ORRERY_OK;  // result
+};
+
+}  // namespace internal
+
+class FlightProcess::Impl {
+ public:
+  explicit Impl(FlightProcessOptions options);
+  ~Impl();
+
+  CallOutcome call(internal::CallArguments arguments, SimTime truth, Bytes data);
+  CallOutcome create(SimTime truth, std::int64_t onboard_ns, std::uint32_t boot_count,
+                     std::uint32_t reset_cause);
+  bool shut_down_library();
+  void require_alive(const char* function) const;
+  void require_between_calls(const char* function) const;
+  void die_of_last_call(SimTime truth);
+  void die(CrashKind kind, std::string message, SimTime truth,
+           const internal::CallArguments& arguments);
+
+  // What the library may ask of the host, within a call.
+  std::int32_t output(std::uint32_t port, const void* data, std::uint32_t bytes);
+  void request_tick(std::int64_t at_ns);
+  void log(std::int32_t level, const char* line);
+  std::int32_t load_slot(std::uint32_t slot, void* buffer, std::uint32_t capacity);
+  std::int32_t store_slot(std::uint32_t slot, const void* data, std::uint32_t bytes);
+
+  FlightProcessOptions options;
+  std::string name;
+  std::vector<FlightPort> ports;
+  const orrery_flight* flight = nullptr;
+  std::unique_ptr<SimulatedHeap> heap;     // null where heaps are not simulated
+  std::unique_ptr<FlightLibrary> library;  // unloaded while the heap is still there
+
+  bool created = false, alive = false, crashed = false, ended = false;
+  CallRecord record;
+  CrashReport crash;
+  std::optional<std::int64_t> tick_request;
+  Storage storage;
+  internal::HostStopwatch stopwatch;
+
+  struct OutputRow {
+    std::uint32_t port;  // index
+    std::size_t begin, bytes;
+  };
+  std::vector<OutputRow> outputs;
+  ByteBuffer output_bytes;
+  struct LogRow {
+    LogLevel level;
+    std::size_t begin, bytes;
+  };
+  std::vector<LogRow> logs;
+  std::string log_text;
+
+ private:
+  void load();
+  void fill_host_table();
+  void begin_call();
+  void end_call(SimTime truth);
+  void run_library_call();
+  CallOutcome judge(const internal::CallArguments& arguments, SimTime truth);
+  void host_log(LogLevel level, std::string_view text);
+  void report_floating_point();
+  bool calling() const { return internal::running_process() == &contained_; }
+  std::uint32_t find_output(std::uint32_t id) const;
+  static void on_heap_fault(void* self, const HeapFault& fault);
+
+  internal::ContainedProcess contained_;
+  internal::CrashCapture capture_;
+  orrery_host host_{};
+  void* self_ = nullptr;
+  internal::CallArguments arguments_;
+  ByteBuffer input_;    // a copy, so that flight code cannot change the simulator's
+  ByteBuffer staging_;  // a store that may still fault
+  std::uint64_t allocations_before_ = 0;
+  bool reported_floating_point_ = false;
+};
+
+}  // namespace orrery
