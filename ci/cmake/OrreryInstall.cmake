@@ -22,7 +22,7 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/orreryConfigVersion.cmake
 install(FILES
   ${PROJECT_BINARY_DIR}/orreryConfig.cmake
   ${PROJECT_BINARY_DIR}/orreryConfigVersion.cmake
-  ${CMAKE_CURRENT_LIST_DIR}/OrreryErfa.cmake
+  ${CMAKE_CURRENT_LIST_DIR}/OrreryDependencies.cmake
   ${CMAKE_CURRENT_LIST_DIR}/OrreryNumerics.cmake
   ${CMAKE_CURRENT_LIST_DIR}/OrreryUser.cmake
   DESTINATION ${orrery_package_dir})

@@ -28,10 +28,8 @@
 #define ORRERY_NO_TICK ((int64_t)-1) /* any negative time withdraws the request */
 
 /* Status codes. */
-#define ORRERY_OK 0 /* done */
-#define ORRERY_REJECTED                                                    \
-  1 /* this message was not usable or not accepted; counted, not a failure \
-     */
+#define ORRERY_OK 0           /* done */
+#define ORRERY_REJECTED 1     /* message not usable or not accepted: counted, not a failure */
 #define ORRERY_NOT_FOUND (-1) /* no such port or slot */
 #define ORRERY_TOO_SMALL (-2) /* buffer or medium too small; nothing was written */
 #define ORRERY_FATAL (-100)   /* cannot go on: the host ends this process as if it had crashed */

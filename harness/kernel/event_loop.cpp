@@ -27,13 +27,14 @@ class EventLoop::Running {
     if (!loop.in_fingerprint_) return;
     sim_event = ++loop.executed_;
     loop.fingerprint_.event(event.key, event.kind->id);
+    loop.last_ = {event.key, event.kind, loop.fingerprint_.chain(event.key.destination)};
   }
   Running(const Running&) = delete;
   Running& operator=(const Running&) = delete;
   ~Running() {
-    if (loop_.keep_log_ && loop_.in_fingerprint_) {
-      loop_.log_.push_back(
-          {event_.key, event_.kind, loop_.fingerprint_.chain(event_.key.destination)});
+    if (loop_.in_fingerprint_) {
+      loop_.last_.chain = loop_.fingerprint_.chain(event_.key.destination);
+      if (loop_.keep_log_) loop_.log_.push_back(loop_.last_);
     }
     loop_.current_kind_ = nullptr;
   }

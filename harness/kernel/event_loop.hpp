@@ -70,6 +70,8 @@ class EventLoop {
   /// Without the recorder's: the n-th event is the same one whatever is recorded.
   std::uint64_t events_executed() const { return executed_; }
   std::size_t events_pending() const { return queue_.size(); }
+  /// The event that ran last, or is running: for failure messages. Its kind is null if none has.
+  const EventRecord& last_event() const { return last_; }
   /// Kind of the running event, for crash reports; null between events.
   const EventKind* current_kind() const { return current_kind_; }
 
@@ -89,6 +91,7 @@ class EventLoop {
   Fingerprint fingerprint_;
   std::vector<Owner> owners_;
   std::vector<EventRecord> log_;
+  EventRecord last_;
   SimTime now_;
   const EventKind* current_kind_ = nullptr;
   OwnerId current_owner_ = 0;

@@ -1,9 +1,15 @@
 #include <orrery/models/orbit/spacecraft_orbit.hpp>
 
+#include <algorithm>
 #include <stdexcept>
 #include <utility>
 
 namespace orrery {
+namespace {
+
+constexpr Duration kMostRecent = 10min;
+
+}  // namespace
 
 SpacecraftOrbit::SpacecraftOrbit(const OrbitState& initial, SpacecraftOrbitOptions options)
     : options_(std::move(options)), initial_(initial) {
@@ -62,6 +68,21 @@ OrbitState SpacecraftOrbit::at(SimTime t) {
   }
   ++interpolations_;
   return OrbitDynamics::interpolate(left_, *right_, t);
+}
+
+OrbitState SpacecraftOrbit::recent(SimTime t) {
+  start();
+  if (t >= left_.orbit.t) return at(t);
+  if (left_.orbit.t - t > kMostRecent) {
+    throw std::invalid_argument("SpacecraftOrbit::recent: t = " + to_string(t) +
+                                "; accepted: from " + to_string(left_.orbit.t - kMostRecent) +
+                                " on");
+  }
+  OrbitDynamics::State back = left_;
+  while (back.orbit.t > t) {
+    back = dynamics_->step(back, std::max(t, back.orbit.t - options_.step));
+  }
+  return back.orbit;
 }
 
 void SpacecraftOrbit::apply_impulse(SimTime t, const Vec3& dv_ECI) {

@@ -37,6 +37,12 @@ class SpacecraftOrbit {
   /// @throws PropagationError       the orbit went below the ground on the way.
   OrbitState at(SimTime t);
 
+  /// As at(), and for up to 10 min before the last grid point passed: stepped back from there as if
+  /// no impulse had come since, and forgotten. For comparing estimates of an earlier instant with
+  /// truth.
+  /// @throws std::invalid_argument  earlier than that.
+  OrbitState recent(SimTime t);
+
   /// Changes the velocity by dv_ECI [m/s] at `t`; a grid point from then on.
   /// @throws as at(); std::domain_error  dv_ECI not finite.
   void apply_impulse(SimTime t, const Vec3& dv_ECI);

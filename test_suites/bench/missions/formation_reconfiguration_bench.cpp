@@ -1,0 +1,61 @@
+// The first flight as a benchmark: ten orbits of two spacecraft with 60x60 gravity, GNSS every 10
+// s, both flying the compiled package. Nothing is recorded.
+#include <orrery/orrery.hpp>
+
+#include <benchmark/benchmark.h>
+
+#include <sys/resource.h>
+
+#include "formation_keeping_messages.h"
+
+namespace orrery {
+namespace {
+
+constexpr Duration kMission = 57390s;
+
+double peak_memory_MB() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) * 1024 / 1e6;
+}
+
+FormationOptions flown(std::string library) {
+  FormationOptions options;
+  options.flight.library = std::move(library);
+  options.world.record = false;
+  return missions::first_flight(options);
+}
+
+void command_reconfiguration(FormationWorld& world) {
+  const RelativeElements to = missions::safe_ellipse_m(100);
+  const double a_roe_m[6] = {to.da, to.dl, to.dex, to.dey, to.dix, to.diy};
+  std::byte command[FORMATION_COMMAND_BYTES];
+  formation_put_command(reinterpret_cast<unsigned char*>(command), FORMATION_RECONFIGURE, a_roe_m,
+                        to_ns(world.now() + kMission));
+  world.ground().command("deputy", at(10min), command);
+}
+
+/// @param library  empty: orbits and receivers alone
+void BM_FirstFlight(benchmark::State& state, const std::string& library) {
+  double simulated_s = 0, flight_s = 0, total_s = 0;
+  for (auto _ : state) {
+    FormationWorld world(flown(library));
+    if (!library.empty()) command_reconfiguration(world);
+    world.run_for(kMission);
+    simulated_s += to_seconds(kMission);
+    flight_s += world.flight_wall_s();
+    total_s += world.wall_s();
+  }
+  const double runs = static_cast<double>(state.iterations());
+  state.counters["x_real_time"] = benchmark::Counter(simulated_s, benchmark::Counter::kIsRate);
+  state.counters["harness_and_models_s"] = (total_s - flight_s) / runs;
+  state.counters["flight_s"] = flight_s / runs;
+  state.counters["peak_memory_MB"] = peak_memory_MB();
+}
+BENCHMARK_CAPTURE(BM_FirstFlight, formation_keeping, std::string("formation_keeping"))
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(BM_FirstFlight, without_flight_software, std::string())
+    ->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace orrery

@@ -1,0 +1,69 @@
+#include <orrery/harness/gtest/flags.hpp>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+namespace orrery {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+TEST(FlagsTest, DefaultsHoldWhereNothingIsSaid) {
+  const Flags f = parse_flags({"--gtest_filter=*"}, {"HOME=/"});
+  EXPECT_EQ(f.seed, 1u);
+  EXPECT_FALSE(f.runs.has_value());
+  EXPECT_TRUE(f.out.empty());
+  EXPECT_EQ(f.record.mode, RecordSetting::Mode::kPeriodic);
+  EXPECT_FALSE(f.record.period.has_value());
+  EXPECT_EQ(f.log.level, 4);
+}
+
+TEST(FlagsTest, TheCommandLineBeatsTheEnvironment) {
+  EXPECT_EQ(parse_flags({}, {"ORRERY_SEED=7"}).seed, 7u);
+  EXPECT_EQ(parse_flags({"--orrery_seed=9"}, {"ORRERY_SEED=7"}).seed, 9u);
+}
+
+TEST(FlagsTest, SeedsStayExactInADouble) {
+  EXPECT_EQ(parse_flags({"--orrery_seed=9007199254740991"}, {}).seed, 9007199254740991u);
+  EXPECT_THAT([] { parse_flags({"--orrery_seed=9007199254740992"}, {}); },
+              ThrowsMessage<std::invalid_argument>(
+                  AllOf(HasSubstr("9007199254740992"), HasSubstr("0 to 9007199254740991"))));
+}
+
+TEST(FlagsTest, TimesTakeSecondsOrAUnit) {
+  EXPECT_EQ(parse_flags({"--orrery_break_at=12.5"}, {}).break_at, 12500ms);
+  EXPECT_EQ(parse_flags({"--orrery_break_at=12.5s"}, {}).break_at, 12500ms);
+  EXPECT_EQ(parse_flags({"--orrery_record=500ms"}, {}).record.period, 500ms);
+  EXPECT_EQ(parse_flags({"--orrery_record=off"}, {}).record.mode, RecordSetting::Mode::kOff);
+  EXPECT_EQ(parse_flags({"--orrery_record=events"}, {}).record.mode, RecordSetting::Mode::kEvents);
+}
+
+TEST(FlagsTest, LogTakesALevelAndASpacecraft) {
+  const Flags f = parse_flags({"--orrery_log=warning,deputy"}, {});
+  EXPECT_EQ(f.log.level, 2);
+  EXPECT_EQ(f.log.spacecraft, "deputy");
+}
+
+TEST(FlagsTest, NonsenseIsNamed) {
+  for (const char* flag :
+       {"--orrery_seed=-1", "--orrery_seed=1x", "--orrery_seed=", "--orrery_runs=0",
+        "--orrery_out=", "--orrery_record=0", "--orrery_record=nan", "--orrery_break_at=-3",
+        "--orrery_break_at=1e300", "--orrery_log=loud", "--orrery_progress=maybe"}) {
+    EXPECT_THAT([flag] { parse_flags({flag}, {}); },
+                ThrowsMessage<std::invalid_argument>(HasSubstr(flag)))
+        << flag;
+  }
+  EXPECT_THAT([] { parse_flags({"--orrery_sed=1"}, {}); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("known are --orrery_break_at")));
+  EXPECT_THAT([] { parse_flags({"--orrery_seed"}, {}); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("needs a value")));
+  EXPECT_THAT([] { parse_flags({"--orrery_threads=2"}, {}); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("one thread")));
+}
+
+}  // namespace
+}  // namespace orrery
