@@ -11,7 +11,11 @@ namespace orrery {
 namespace {
 
 class Listener : public testing::EmptyTestEventListener {
-  void OnTestStart(const testing::TestInfo&) override { explained_ = false; }
+  void OnTestStart(const testing::TestInfo& test) override {
+    explained_ = false;
+    set_current_test(std::string(test.test_suite_name()) + "." + test.name());
+  }
+  void OnTestEnd(const testing::TestInfo&) override { set_current_test({}); }
 
   void OnTestPartResult(const testing::TestPartResult& result) override {
     if (!result.failed() || explained_) return;

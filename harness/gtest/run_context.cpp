@@ -1,7 +1,6 @@
 #include <orrery/harness/gtest/flags.hpp>
 #include <orrery/harness/gtest/run_context.hpp>
-
-#include <gtest/gtest.h>
+#include <orrery/harness/record/number_format.hpp>
 
 #include <algorithm>
 #include <utility>
@@ -23,8 +22,9 @@ std::string describe(const RunSnapshot& s) {
   return text + s.spacecraft;
 }
 
-std::string quoted_filter(const testing::TestInfo& test) {
-  return std::string("--gtest_filter='") + test.test_suite_name() + "." + test.name() + "'";
+std::string& current_test() {
+  static std::string name;
+  return name;
 }
 
 }  // namespace
@@ -44,11 +44,14 @@ std::string describe_live_runs() {
   return text;
 }
 
+void set_current_test(const std::string& suite_and_name) {
+  current_test() = suite_and_name;
+}
+
 std::string replay_command() {
-  const testing::TestInfo* test = testing::UnitTest::GetInstance()->current_test_info();
-  if (test == nullptr) return {};
-  std::string command = program_name() + " " + quoted_filter(*test) +
-                        " --orrery_seed=" + std::to_string(flags().seed);
+  if (current_test().empty()) return {};
+  std::string command = program_name() + " --gtest_filter='" + current_test() +
+                        "' --orrery_seed=" + std::to_string(flags().seed);
   if (flags().runs) command += " --orrery_runs=" + std::to_string(*flags().runs);
   return command;
 }
@@ -56,9 +59,10 @@ std::string replay_command() {
 std::string debug_command(Duration elapsed) {
   const std::string replay = replay_command();
   if (replay.empty()) return {};
-  const std::string at = to_string(elapsed);  // "12.5 s"
+  std::string seconds;
+  append_number(seconds, to_seconds(elapsed));
   return "gdb -ex 'break sim_debug_break' -ex run --args " + replay +
-         " --orrery_break_at=" + at.substr(0, at.find(' '));
+         " --orrery_break_at=" + seconds;
 }
 
 }  // namespace orrery

@@ -34,6 +34,9 @@ class LiveRun {
 
 /// Text on all live runs of this thread, oldest first; empty if there is none.
 std::string describe_live_runs();
+/// The listener says which test runs: GoogleTest itself cannot be asked while it reports a failure
+/// (it holds a lock). Empty: none.
+void set_current_test(const std::string& suite_and_name);
 /// "./x_test --gtest_filter=A.B --orrery_seed=3", for the running test; empty outside of one.
 std::string replay_command();
 /// The same under gdb, stopping just before `elapsed`.
