@@ -11,9 +11,9 @@ struct NutationOffsets {
 };
 
 /// The dPsi, dEps with which IAU 1976 precession and IAU 1980 nutation put the celestial pole where
-/// IAU 2006/2000A puts it with dX, dY, both models from ERFA, by exact geometry: the two chains to ITRF
-/// then agree within 0.002 mas. The frame bias of the pole is in the result, as it is in what the IERS
-/// publishes, from which it differs by up to 0.2 mas (1980-2025).
+/// IAU 2006/2000A puts it with dX, dY, both models from ERFA, by exact geometry: the two chains to
+/// ITRF then agree within 0.002 mas. The frame bias of the pole is in the result, as it is in what
+/// the IERS publishes, from which it differs by up to 0.2 mas (1980-2025).
 NutationOffsets offsets_to_iau1980(const JulianDate& tt, double dX_rad, double dY_rad);
 
 }  // namespace orrery::eop

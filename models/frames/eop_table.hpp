@@ -25,15 +25,15 @@ struct EarthOrientationParameters {
 ///           (polar motion, UT1-UTC, dPsi, dEps, dX, dY, TAI-UTC). Observed and predicted rows
 ///           count alike; last_observed() tells where the prediction begins. Rows before 1980 are
 ///           checked and left out, since leap_seconds() and SimTime's calendar begin there.
-/// Method    Cubic Lagrange through the four rows nearest, on UT1-TAI, which has no leap seconds.
-/// At
+/// Method    Cubic Lagrange through the four rows nearest, on UT1-TAI, which has no leap seconds;
+/// at
 ///           a row its own values, to rounding. Interpolating a day of the 13.66 d tide this way
 ///           leaves 1 us of UT1; linear interpolation 20 us, 1 cm in low Earth orbit. Tides within
-///           a day (UT1 50 us, pole 0.5 mas: 2 cm) are not in the files, nor added. dX, dY of
-///           finals2000A (corrections to IAU 2000A/2006) are turned into dPsi, dEps by comparing
-///           the two models' poles at the instant asked for: about 0.1 ms a call; with CelesTrak's
-///           dPsi, dEps 0.3 us. Missing predictions of dX, dY count as zero (0.3 mas), of the
-///           length of day follow from UT1.
+///           a day (UT1 50 us, pole 0.5 mas: 2 cm) are not in the files, nor added.
+///           dX, dY of finals2000A (corrections to IAU 2000A/2006) are turned into dPsi, dEps by
+///           comparing the two models' poles at the instant asked for: about 0.1 ms a call; with
+///           CelesTrak's dPsi, dEps 0.3 us. Missing predictions of dX, dY count as zero (0.3 mas),
+///           those of the length of day follow from UT1.
 /// Pure      Same instant, same bits, whatever was asked before; safe to call from several threads.
 /// Errors    Everything that does not read as a whole file throws std::invalid_argument with source
 ///           and line: cut short, wrong columns, not a number, not finite, implausibly large, not
