@@ -62,13 +62,13 @@ typedef struct orrery_host { /* outlives the instance */
   uint32_t size, abi_version;
   void* context; /* first argument of every function below */
   int32_t (*output)(void* context, uint32_t port, const void* data, uint32_t bytes);
-  void (*request_tick)(void* context,
-                       int64_t at_ns); /* replaces the pending one; spent when delivered */
+  /* Replaces the pending one; spent when delivered. */
+  void (*request_tick)(void* context, int64_t at_ns);
   void (*log)(void* context, int32_t level, const char* line);
-  int32_t (*nv_load)(void* context, uint32_t slot, void* buffer,
-                     uint32_t capacity); /* bytes or < 0 */
-  int32_t (*nv_store)(void* context, uint32_t slot, const void* data,
-                      uint32_t bytes); /* all or nothing */
+  /* The bytes loaded, or < 0. */
+  int32_t (*nv_load)(void* context, uint32_t slot, void* buffer, uint32_t capacity);
+  /* All or nothing. */
+  int32_t (*nv_store)(void* context, uint32_t slot, const void* data, uint32_t bytes);
 } orrery_host;
 
 typedef struct orrery_flight { /* static in the library */

@@ -1,18 +1,25 @@
 /* Byte layouts of the messages that Orrery's ready devices understand. C89, little-endian, no
  * struct overlay: each message has a size, a put and a get function. Times are ns of the onboard
  * clock (GPS scale). Teams with formats of their own pass a translator to connect() in the test
- * instead.
- *
- *   thruster          0 i64 mid_burn_ns | 8 f64 dv_ECI[3] m/s (EME2000)             flight ->
- * device at least 20 s before the burn's middle thruster_on_time  0 i64 start_ns | 8 u8 nozzle | 9
- * f64 duration_s               flight -> device bus               0 i64 t_ns | 8 f64 q_BI[4] (w
- * first) | 40 f64 omega_BI_B[3] rad/s | 64 f64 on_time_s[6], commanded, since boot, per nozzle
- * device -> flight estimate          0 i64 t_ns | 8 f64 r_DC_RTN[3] m | 32 f64 v_DC_RTN[3] m/s | 56
- * f64 sigma_r[3] m | 80 f64 sigma_v[3] m/s                 flight -> test deputy relative to chief
- * in the chief's RTN, derivative taken in RTN, whichever spacecraft sends it observation       0
- * i64 begin_ns | 8 i64 end_ns                                 flight -> test mode              0
- * i64 t_ns | 8 u32 mode, the package's own number             flight -> test command           the
- * team's own bytes, exactly as the ground sent them         device -> flight */
+ * instead. */
+
+/* clang-format off: a table */
+/*   message           layout                                                     direction
+ *   thruster          0 i64 mid_burn_ns | 8 f64 dv_ECI[3] m/s (EME2000)          flight -> device
+ *                     at least 20 s before the middle of the burn
+ *   thruster_on_time  0 i64 start_ns | 8 u8 nozzle | 9 f64 duration_s            flight -> device
+ *   bus               0 i64 t_ns | 8 f64 q_BI[4] (w first)                       device -> flight
+ *                     | 40 f64 omega_BI_B[3] rad/s
+ *                     | 64 f64 on_time_s[6], commanded, since boot, per nozzle
+ *   estimate          0 i64 t_ns | 8 f64 r_DC_RTN[3] m | 32 f64 v_DC_RTN[3] m/s  flight -> test
+ *                     | 56 f64 sigma_r[3] m | 80 f64 sigma_v[3] m/s
+ *                     deputy relative to chief in the chief's RTN, derivative taken in RTN,
+ *                     whichever spacecraft sends it
+ *   observation       0 i64 begin_ns | 8 i64 end_ns                              flight -> test
+ *   mode              0 i64 t_ns | 8 u32 mode, the package's own number          flight -> test
+ *   command           the team's own bytes, exactly as the ground sent them      device -> flight
+ */
+/* clang-format on */
 #ifndef ORRERY_MESSAGES_H
 #define ORRERY_MESSAGES_H
 
