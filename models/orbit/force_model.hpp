@@ -33,7 +33,8 @@ class ForceModel {
   /// Acceleration [m/s^2] besides the Earth's point-mass attraction -mu r/|r|^3, which the
   /// propagator carries itself.
   virtual Vec3 acceleration_ECI(const OrbitState&, const Surroundings&) const = 0;
-  /// The first instant after `t` at which the acceleration jumps; the integrator ends a step there.
+  /// The first instant after `t` at which the acceleration jumps; from that instant on the new
+  /// value holds. The integrator ends a step there and sees the old value up to it.
   virtual std::optional<SimTime> next_discontinuity(SimTime t) const {
     (void)t;
     return {};

@@ -7,92 +7,76 @@
 namespace orrery {
 namespace {
 
-constexpr Duration kMostRecent = 10min;
+constexpr Duration kRecent = 10min;
 
 }  // namespace
 
+OrbitDynamics::State SpacecraftOrbit::Model::step(const State& from, SimTime, SimTime to) {
+  State end = dynamics_.step(from, to);
+  // From the same point once more: something happened before the end of the step that was kept.
+  while (!kept_.empty() && kept_.back().from.orbit.t >= from.orbit.t) kept_.pop_back();
+  kept_.push_back({from, end});
+  while (kept_.front().to.orbit.t < from.orbit.t - kRecent) kept_.pop_front();
+  return end;
+}
+
+std::optional<OrbitState> SpacecraftOrbit::Model::kept(SimTime t) const {
+  const auto starts_after = [](SimTime instant, const Step& step) {
+    return instant < step.from.orbit.t;
+  };
+  const auto next = std::upper_bound(kept_.begin(), kept_.end(), t, starts_after);
+  if (next == kept_.begin()) return {};
+  const Step& step = *std::prev(next);
+  if (t == step.from.orbit.t) return step.from.orbit;
+  return OrbitDynamics::interpolate(step.from, step.to, t);
+}
+
 SpacecraftOrbit::SpacecraftOrbit(const OrbitState& initial, SpacecraftOrbitOptions options)
-    : options_(std::move(options)), initial_(initial) {
+    : initial_(initial), options_(std::move(options)) {
   if (options_.step <= Duration::zero()) {
     throw std::invalid_argument("SpacecraftOrbit: step = " + to_string(options_.step) +
                                 "; accepted: above 0");
   }
   // Everything that could be wrong shows here rather than at the first look.
-  left_ = OrbitDynamics(options_.environment, options_.forces).start(initial_);
+  OrbitDynamics(options_.environment, options_.forces).start(initial_);
 }
 
 void SpacecraftOrbit::add_force(std::shared_ptr<const ForceModel> force) {
-  if (dynamics_ != nullptr)
-    throw std::logic_error("SpacecraftOrbit::add_force: the orbit has started");
+  if (system_) throw std::logic_error("SpacecraftOrbit::add_force: the orbit has started");
   if (force == nullptr) throw std::invalid_argument("SpacecraftOrbit::add_force: null");
   options_.forces.push_back(std::move(force));
 }
 
-void SpacecraftOrbit::start() {
-  if (dynamics_ != nullptr) return;
-  dynamics_ = std::make_unique<OrbitDynamics>(options_.environment, options_.forces);
-  left_ = dynamics_->start(initial_);
-}
-
-SimTime SpacecraftOrbit::next_grid_point() const {
-  const SimTime now = left_.orbit.t;
-  const Duration since_start = now - initial_.t;
-  SimTime next = now + (options_.step - since_start % options_.step);
-  if (const auto jump = dynamics_->next_discontinuity(now); jump && *jump < next) next = *jump;
-  return next;
-}
-
-// Afterwards left_.t <= t, and t < right_.t if there is a right_.
-void SpacecraftOrbit::move_to(SimTime t) {
-  start();
-  if (t < left_.orbit.t) {
-    throw std::invalid_argument("SpacecraftOrbit: t = " + to_string(t) +
-                                " has passed; accepted: from " + to_string(left_.orbit.t) + " on");
+LazySystem<SpacecraftOrbit::Model>& SpacecraftOrbit::system() {
+  if (!system_) {
+    OrbitDynamics dynamics(options_.environment, options_.forces);
+    const OrbitDynamics::State start = dynamics.start(initial_);
+    system_.emplace(Model(std::move(dynamics)), start, initial_.t, options_.step);
   }
-  while (t >= next_grid_point()) {
-    if (!right_) {
-      right_ = dynamics_->step(left_, next_grid_point());
-      ++steps_;
-    }
-    left_ = *right_;
-    right_.reset();
-  }
+  return *system_;
 }
 
 OrbitState SpacecraftOrbit::at(SimTime t) {
-  move_to(t);
-  if (t == left_.orbit.t) return left_.orbit;
-  if (!right_) {
-    right_ = dynamics_->step(left_, next_grid_point());
-    ++steps_;
-  }
-  ++interpolations_;
-  return OrbitDynamics::interpolate(left_, *right_, t);
+  return system().at(t).orbit;
 }
 
 OrbitState SpacecraftOrbit::recent(SimTime t) {
-  start();
-  if (t >= left_.orbit.t) return at(t);
-  if (left_.orbit.t - t > kMostRecent) {
-    throw std::invalid_argument("SpacecraftOrbit::recent: t = " + to_string(t) +
-                                "; accepted: from " + to_string(left_.orbit.t - kMostRecent) +
-                                " on");
+  const SimTime passed = system().committed_time();
+  if (t >= passed) return at(t);
+  const SimTime earliest = std::max(initial_.t, passed - kRecent);
+  const std::optional<OrbitState> state = t < earliest ? std::nullopt : system().model().kept(t);
+  if (!state) {
+    throw std::logic_error("SpacecraftOrbit::recent: t = " + to_string(t) + "; accepted: from " +
+                           to_string(earliest) + " on");
   }
-  OrbitDynamics::State back = left_;
-  while (back.orbit.t > t) {
-    back = dynamics_->step(back, std::max(t, back.orbit.t - options_.step));
-  }
-  return back.orbit;
+  return *state;
 }
 
 void SpacecraftOrbit::apply_impulse(SimTime t, const Vec3& dv_ECI) {
-  move_to(t);
-  if (t > left_.orbit.t) {
-    left_ = dynamics_->step(left_, t);
-    ++steps_;
-  }
-  left_ = dynamics_->after_impulse(left_, dv_ECI);
-  right_.reset();
+  LazySystem<Model>& orbit = system();
+  orbit.discontinuity(t, [&](OrbitDynamics::State& state) {
+    state = orbit.model().dynamics().after_impulse(state, dv_ECI);
+  });
 }
 
 }  // namespace orrery

@@ -1,10 +1,13 @@
 /// The truth orbit of one spacecraft: propagated only as far as somebody looks.
 #pragma once
 
+#include <orrery/harness/kernel/lazy_system.hpp>
 #include <orrery/harness/kernel/time.hpp>
 #include <orrery/models/orbit/orbit_dynamics.hpp>
 
+#include <deque>
 #include <memory>
+#include <optional>
 
 namespace orrery {
 
@@ -17,34 +20,31 @@ struct SpacecraftOrbitOptions {
   std::shared_ptr<const SpaceEnvironment> environment = {};  // required
 };
 
-/// A lazily propagated continuous system.
-///
-/// The grid is fixed by `step`, by the impulses and by the discontinuities of the forces. A look
-/// between two grid points is interpolated and leaves no trace: any pattern of looks gives the same
-/// orbit, to the bit. Instants run forward: the past beyond the last grid point is forgotten.
+/// A LazySystem of OrbitDynamics: its grid is fixed by `step`, by the impulses and by the
+/// discontinuities of the forces; any pattern of looks gives the same orbit, to the bit. Looks and
+/// impulses come in the order of time.
 class SpacecraftOrbit {
  public:
   /// @throws std::invalid_argument  an orbit below the ground or not an ellipse, mass <= 0, step <=
-  /// 0,
-  ///                                no environment, a null force.
+  ///                                0, no environment, a null force.
   SpacecraftOrbit(const OrbitState& initial, SpacecraftOrbitOptions options);
 
   /// @throws std::logic_error  after the first look or impulse. @throws std::invalid_argument null.
   void add_force(std::shared_ptr<const ForceModel> force);
 
-  /// The state at `t`, right-continuous at impulses.
-  /// @throws std::invalid_argument  before the last grid point that a look or impulse has passed.
-  /// @throws PropagationError       the orbit went below the ground on the way.
+  /// The state at `t`; at an impulse, after it.
+  /// @throws std::logic_error  `t` before the last grid point that a look or impulse has passed.
+  /// @throws PropagationError  the orbit went below the ground on the way.
   OrbitState at(SimTime t);
 
-  /// As at(), and for up to 10 min before the last grid point passed: stepped back from there as if
-  /// no impulse had come since, and forgotten. For comparing estimates of an earlier instant with
-  /// truth.
-  /// @throws std::invalid_argument  earlier than that.
+  /// The truth as it was at `t`, up to 10 min before the last grid point passed: the same bits that
+  /// a look gave at that time, impulses since then undone. For comparing estimates of an earlier
+  /// instant with truth. From the last grid point on it is at().
+  /// @throws std::logic_error  earlier than that, or before the start.
   OrbitState recent(SimTime t);
 
-  /// Changes the velocity by dv_ECI [m/s] at `t`; a grid point from then on.
-  /// @throws as at(); std::domain_error  dv_ECI not finite.
+  /// Changes the velocity by dv_ECI [m/s] at `t`, which becomes a grid point.
+  /// @throws as at(); std::domain_error  dv_ECI not finite; PropagationError  no ellipse any more.
   void apply_impulse(SimTime t, const Vec3& dv_ECI);
 
   /// Osculating elements at `t`. Errors as at().
@@ -54,20 +54,41 @@ class SpacecraftOrbit {
 
   /// RK4 steps computed so far, those thrown away for an impulse included; looks between grid
   /// points.
-  std::uint64_t steps() const { return steps_; }
-  std::uint64_t interpolations() const { return interpolations_; }
+  std::uint64_t steps() const { return system_ ? system_->steps() : 0; }
+  std::uint64_t interpolations() const { return system_ ? system_->interpolations() : 0; }
 
  private:
-  void start();
-  void move_to(SimTime t);
-  SimTime next_grid_point() const;
+  /// What LazySystem propagates. It keeps the steps of the last minutes for recent(); that changes
+  /// no result.
+  class Model {
+   public:
+    using State = OrbitDynamics::State;
+    explicit Model(OrbitDynamics dynamics) : dynamics_(std::move(dynamics)) {}
+    State step(const State& from, SimTime, SimTime to);
+    /// A look needs position and velocity only: the elements are left out.
+    State interpolate(const State& a, SimTime, const State& b, SimTime, SimTime t) const {
+      return State{.orbit = OrbitDynamics::interpolate(a, b, t)};
+    }
+    std::optional<SimTime> next_discontinuity(SimTime t) const {
+      return dynamics_.next_discontinuity(t);
+    }
+    const OrbitDynamics& dynamics() const { return dynamics_; }
+    /// From the steps that were kept; empty before the first of them.
+    std::optional<OrbitState> kept(SimTime t) const;
 
-  SpacecraftOrbitOptions options_;
+   private:
+    struct Step {
+      State from, to;
+    };
+    OrbitDynamics dynamics_;
+    std::deque<Step> kept_;  // in order of time; the last may have been thrown away since
+  };
+
+  LazySystem<Model>& system();
+
   OrbitState initial_;
-  std::unique_ptr<const OrbitDynamics> dynamics_;  // from the start on
-  OrbitDynamics::State left_;                      // the last grid point passed
-  std::optional<OrbitDynamics::State> right_;      // the next one, once somebody has looked
-  std::uint64_t steps_ = 0, interpolations_ = 0;
+  SpacecraftOrbitOptions options_;
+  std::optional<LazySystem<Model>> system_;  // from the first look on
 };
 
 }  // namespace orrery

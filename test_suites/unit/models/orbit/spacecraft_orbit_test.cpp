@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <vector>
 
 namespace orrery {
 namespace {
@@ -163,9 +164,40 @@ TEST(SpacecraftOrbitTest, ThePastIsForgotten) {
   SpacecraftOrbit orbit(initial_state(), earth_options());
   (void)orbit.at(kStart + 95s);
   EXPECT_NO_THROW((void)orbit.at(kStart + 92s)) << "after the last grid point";
-  EXPECT_THROW((void)orbit.at(kStart + 85s), std::invalid_argument);
-  EXPECT_THROW((void)orbit.at(kStart - 1ns), std::invalid_argument);
-  EXPECT_THROW(orbit.apply_impulse(kStart + 85s, {}), std::invalid_argument);
+  EXPECT_THROW((void)orbit.at(kStart + 85s), std::logic_error);
+  EXPECT_THROW((void)orbit.at(kStart - 1ns), std::logic_error);
+  EXPECT_THROW(orbit.apply_impulse(kStart + 85s, {}), std::logic_error);
+}
+
+// Looks at 1 s, kept; then burns, on and off the grid, and long spans without a look.
+TEST(SpacecraftOrbitTest, RecentPastIsWhatALookGaveAtThatTime) {
+  SpacecraftOrbit orbit(initial_state(), earth_options());
+  std::vector<OrbitState> looks;
+  for (int s = 0; s < 900; ++s) {
+    if (s == 640) orbit.apply_impulse(kStart + 640s, {0.1, 0, 0});
+    if (s == 705) orbit.apply_impulse(kStart + 705s, {0, 0.1, 0});
+    looks.push_back(orbit.at(kStart + s * 1s));
+  }
+  for (int s = 290; s < 900; ++s) {
+    const OrbitState past = orbit.recent(kStart + s * 1s);
+    if (s <= 700 || s >= 705) {
+      EXPECT_TRUE(same_bits(past, looks[s])) << s;
+    } else {
+      // Interpolated towards 710 s at the time, towards the burn's 705 s now: what a step errs.
+      EXPECT_LT(norm(past.r_ECI - looks[s].r_ECI), 7e-8) << s;
+      EXPECT_LT(norm(past.v_ECI - looks[s].v_ECI), 2e-8) << s;
+    }
+  }
+  EXPECT_TRUE(same_bits(orbit.recent(kStart + 950s), orbit.at(kStart + 950s))) << "not past at all";
+}
+
+TEST(SpacecraftOrbitTest, RecentPastEndsTenMinutesBack) {
+  SpacecraftOrbit orbit(initial_state(), earth_options());
+  EXPECT_THROW((void)orbit.recent(kStart - 1ns), std::logic_error);
+  (void)orbit.at(kStart + 1h);
+  EXPECT_NO_THROW((void)orbit.recent(kStart + 50min));
+  EXPECT_THAT([&] { (void)orbit.recent(kStart + 50min - 1ns); },
+              ThrowsMessage<std::logic_error>(HasSubstr("accepted: from 2025-03-20T00:50:00")));
 }
 
 TEST(SpacecraftOrbitTest, WrongOptionsAreRefusedAtOnce) {
