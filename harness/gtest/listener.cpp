@@ -1,5 +1,6 @@
 #include <orrery/harness/gtest/listener.hpp>
 #include <orrery/harness/gtest/run_context.hpp>
+#include <orrery/harness/heap/interposition.hpp>
 
 #include <gtest/gtest.h>
 
@@ -46,6 +47,10 @@ void install_listener() {
 }
 
 int run_all_tests() {
+  if (const std::string lost = verify_interposition(); !lost.empty()) {
+    std::fprintf(stderr, "orrery: %s\n", lost.c_str());
+    return 3;
+  }
   const int failed = RUN_ALL_TESTS();
   if (failed != 0) return 1;
   if (testing::GTEST_FLAG(list_tests)) return 0;

@@ -10,7 +10,7 @@ namespace orrery {
 void install_listener();
 
 /// RUN_ALL_TESTS() with Orrery's exit codes: 0 passed, 1 failed, 2 nothing ran (listing, and empty
-/// shards of an unfiltered run, excepted).
+/// shards of an unfiltered run, excepted), 3 the allocator's hooks are not taken.
 int run_all_tests();
 
 }  // namespace orrery
