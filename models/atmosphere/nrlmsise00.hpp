@@ -55,9 +55,12 @@ struct Nrlmsise00Output {
 ///          P. Drob, A. C. Aikin, J. Geophys. Res. 107(A12), 1468, 2002; coefficients of the
 ///          published model (models/data). All optional variations on: switches 1 to 23 of the
 ///          publication are 1.
-/// Differs  from the published code by less than 1e-10: products are summed in another order, and
-///          densities are carried as logarithms until the end.
-/// Checked  test_suites/validation/models/atmosphere/nrlmsise00_test.cpp, 17 published cases
+/// Differs  from the equations as published by 1e-13: sums are taken in another order, and
+/// densities stay
+///          logarithms until the end.
+/// Bits     the same from g++ and clang, with and without optimisation, on one C library.
+/// Checked  test_suites/validation/models/atmosphere/nrlmsise00_test.cpp, 17 published cases, and
+///          test_suites/unit/models/atmosphere/nrlmsise00_equations_test.cpp, term by term
 /// @throws std::invalid_argument  an argument that is not finite, or a day, time or angle out of
 /// range.
 /// @throws std::domain_error  altitude, F10.7 or ap out of range, or a combination of them for

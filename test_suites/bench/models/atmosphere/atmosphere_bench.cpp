@@ -1,6 +1,9 @@
 #include <orrery/models/atmosphere/nrlmsise00.hpp>
+#include <orrery/models/atmosphere/nrlmsise00_atmosphere.hpp>
 
 #include <benchmark/benchmark.h>
+
+#include <cmath>
 
 namespace orrery {
 namespace {
@@ -37,6 +40,21 @@ void BM_Nrlmsise00_ApHistory(benchmark::State& state) {
   evaluate(state, input);
 }
 BENCHMARK(BM_Nrlmsise00_ApHistory)->Arg(400)->Arg(550);
+
+// What a drag force pays: leap seconds, geodetic place, space weather and the model.
+void BM_Nrlmsise00Atmosphere_Density(benchmark::State& state) {
+  const Nrlmsise00Atmosphere atmosphere({.weather = SpaceWeather::monthly()});
+  const SimTime epoch = gps_midnight(2024, 6, 20);
+  Duration since{};
+  for (auto _ : state) {
+    since = since > 24h ? Duration{} : since + 10s;
+    const double angle_rad = 1.1e-3 * to_seconds(since);
+    const double sine = std::sin(angle_rad);
+    const Vec3 r_ECEF{6.92e6 * std::cos(angle_rad), 6.92e6 * 0.1 * sine, 6.92e6 * 0.99 * sine};
+    benchmark::DoNotOptimize(atmosphere.density_kgpm3(epoch + since, r_ECEF));
+  }
+}
+BENCHMARK(BM_Nrlmsise00Atmosphere_Density);
 
 }  // namespace
 }  // namespace orrery
