@@ -74,7 +74,8 @@ fail_step() {
   local title=$1 log=$2 command=$3
   if [ "${4-}" != quiet ]; then
     # A parallel build goes on after its first error, so the cause is not at the end.
-    grep -n -m 3 -A 12 -E '^FAILED:|error:|CMake Error|^E: ' "$log" >&2 || tail -n 40 "$log" >&2
+    { grep -m 3 -A 12 -E '^FAILED:|error:|CMake Error|^E: ' "$log" || tail -n 40 "$log"; } |
+      cut -c -240 >&2
   fi
   die "step '$title' failed
   command: $command
