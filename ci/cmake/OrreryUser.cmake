@@ -114,9 +114,8 @@ function(orrery_name_flight_targets name)
   set(file ${CMAKE_CURRENT_BINARY_DIR}/${name}_flight_targets_$<CONFIG>.cpp)
   file(GENERATE OUTPUT ${file} CONTENT
 "// Written by orrery_add_test(${name}).
-namespace orrery {
-void register_flight_target(const char* name, const char* path);
-}
+#include <orrery/harness/flight/flight_library.hpp>
+
 namespace {
 struct FlightTarget {
   const char* name;
