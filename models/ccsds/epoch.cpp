@@ -93,8 +93,8 @@ std::optional<std::int64_t> take_fraction_ns(std::string_view& text) {
 
 [[noreturn]] void throw_not_convertible(const std::string& what, TimeSystem system,
                                         const char* accepted) {
-  throw std::invalid_argument("to_sim_time: " + what + " " + std::string(name_of(system)) +
-                              "; accepted: " + accepted);
+  throw std::invalid_argument("to_sim_time, to_epoch: " + what + " " +
+                              std::string(name_of(system)) + "; accepted: " + accepted);
 }
 
 // TAI - UTC on a day from 1972 on.

@@ -22,6 +22,11 @@ bool is_keyword(std::string_view word) {
   }) && word.front() >= 'A';
 }
 
+bool stands_alone(std::string_view keyword) {
+  return keyword == "META_START" || keyword == "META_STOP" || keyword == "COVARIANCE_START" ||
+         keyword == "COVARIANCE_STOP";
+}
+
 std::string_view trimmed(std::string_view text) {
   text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
   return text.substr(0, text.find_last_not_of(kBlanks) + 1);
@@ -85,13 +90,15 @@ std::optional<std::string_view> KvnLines::next_raw_line() {
 
 KvnLine KvnLines::classify(std::string_view line) const {
   const std::size_t equals = line.find('=');
-  if (equals == std::string_view::npos)
-    return is_keyword(line) ? KvnLine{number_, line, {}} : KvnLine{number_, {}, line};
   const std::string_view keyword = trimmed(line.substr(0, equals));
-  const std::string_view value = trimmed(line.substr(equals + 1));
+  const std::string_view value =
+      equals == std::string_view::npos ? std::string_view() : trimmed(line.substr(equals + 1));
+  if (equals == std::string_view::npos && !is_keyword(keyword)) return {number_, {}, line};
   if (!is_keyword(keyword))
     fail(quoted(keyword) + " is not a keyword; accepted: capitals, digits and underscores");
-  if (value.empty()) fail(std::string(keyword) + " has no value");
+  if (stands_alone(keyword) && equals != std::string_view::npos)
+    fail(std::string(keyword) + " takes no value");
+  if (!stands_alone(keyword) && value.empty()) fail(std::string(keyword) + " has no value");
   return {number_, keyword, value};
 }
 

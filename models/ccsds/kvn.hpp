@@ -10,7 +10,8 @@
 
 namespace orrery::ccsds {
 
-/// "KEYWORD = value", or a bare word (META_START), or data without a keyword.
+/// "KEYWORD = value", one of the four words that stand alone (META_START), or data without a
+/// keyword.
 struct KvnLine {
   int number = 0;
   std::string_view keyword;  // empty: data

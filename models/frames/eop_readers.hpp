@@ -36,9 +36,9 @@ File read_celestrak(std::string_view text, std::string_view source);
 /// TAI - UTC [s] at 0h UTC of a day from 1972 on, from ERFA's table.
 int tai_minus_utc_s(int mjd);
 
-constexpr int kMjd1970 = 40587;  // 1970-01-01
-constexpr int kMjd1972 = 41317;  // TAI-UTC is a whole number from here on
-constexpr int kMjd1980 = 44239;  // gps_midnight and leap_seconds begin here
-constexpr int kMjd2200 = 124958;
+constexpr int kMjd1970 = 40587;   // 1970-01-01
+constexpr int kMjd1972 = 41317;   // TAI-UTC is a whole number from here on
+constexpr int kMjd1980 = 44239;   // gps_midnight and leap_seconds begin here
+constexpr int kMjd2200 = 124957;  // 2200-12-31, where they end
 
 }  // namespace orrery::eop

@@ -179,6 +179,8 @@ const Defect kDefects[] = {
     {"CutBeforeCovarianceStop", kFull.substr(0, kFull.find("EPOCH = 2025-03-20T00:01:00")),
      line_of(kFull, "16 17"), "COVARIANCE_STOP is missing"},
     {"MetaStartMissing", with(kSmall, "META_START\n", ""), 4, "accepted: META_START"},
+    {"MetaStartWithValue", with(kSmall, "META_START", "META_START = 1"), 4,
+     "META_START takes no value"},
     {"MetaStopMissing", with(kSmall, "META_STOP\n", ""), 12, "not a keyword of an OEM's metadata"},
     {"MetadataMissing", with(kSmall, "STOP_TIME = 2025-079T00:02:00\n", ""), 11,
      "without STOP_TIME"},
