@@ -1,0 +1,130 @@
+// The reference mission (MISSION_PROGRAM) is run as a child under conditions that must not matter.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <string>
+#include <sys/wait.h>
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Outcome {
+  std::string text;
+  int exit_code = -1;
+};
+
+Outcome run(const std::string& command) {
+  FILE* pipe = popen((command + " 2>&1").c_str(), "r");
+  Outcome outcome;
+  std::array<char, 4096> buffer;
+  while (const std::size_t n = fread(buffer.data(), 1, buffer.size(), pipe)) {
+    outcome.text.append(buffer.data(), n);
+  }
+  const int status = pclose(pipe);
+  outcome.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return outcome;
+}
+
+/// The first of the mission's seeds, with nothing inherited from the surrounding ctest.
+std::string mission(const std::string& flags, const std::string& environment = {}) {
+  return "env -u GTEST_FILTER -u GTEST_TOTAL_SHARDS -u GTEST_SHARD_INDEX -u ORRERY_SEED " +
+         environment + " " + MISSION_PROGRAM +
+         " --gtest_filter='Seeds/FormationReconfigurationTest.*/0' --orrery_progress " + flags;
+}
+
+std::string fingerprint_of(const Outcome& outcome) {
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.text;
+  const std::string label = "  fingerprint ";
+  const std::size_t at = outcome.text.find(label);
+  if (at == std::string::npos) return "none printed";
+  const std::size_t begin = outcome.text.find_first_not_of(' ', at + label.size());
+  return outcome.text.substr(begin, 16);
+}
+
+/// A folder of its own for each test, removed at the end.
+class MissionDeterminismTest : public testing::Test {
+ protected:
+  MissionDeterminismTest() {
+    std::string pattern = (fs::temp_directory_path() / "orrery_determinism_XXXXXX").string();
+    folder_ = mkdtemp(pattern.data());
+  }
+  ~MissionDeterminismTest() override { fs::remove_all(folder_); }
+
+  std::string out(const std::string& name) const {
+    return "--orrery_out=" + (folder_ / name).string();
+  }
+  std::map<std::string, std::string> files(const std::string& name) const {
+    std::map<std::string, std::string> contents;
+    for (const auto& entry : fs::recursive_directory_iterator(folder_ / name)) {
+      if (!entry.is_regular_file()) continue;
+      std::ifstream file(entry.path(), std::ios::binary);
+      contents[entry.path().lexically_relative(folder_ / name).string()] =
+          std::string(std::istreambuf_iterator<char>(file), {});
+    }
+    return contents;
+  }
+
+  fs::path folder_;
+};
+
+/// The lines of summary.json that may differ between equal runs are those of host times.
+std::string without_host_times(const std::string& json) {
+  std::string kept;
+  for (std::size_t at = 0; at < json.size();) {
+    const std::size_t end = std::min(json.find('\n', at), json.size() - 1) + 1;
+    const std::string line = json.substr(at, end - at);
+    const bool is_host_time = line.find("wall_s\"") != std::string::npos ||
+                              line.find("\"x_real_time\"") != std::string::npos;
+    if (!is_host_time) kept += line;
+    at = end;
+  }
+  return kept;
+}
+
+}  // namespace
+
+TEST_F(MissionDeterminismTest, RecordingLogsAndEnvironmentChangeNoFingerprint) {
+  const std::string plain = fingerprint_of(run(mission("")));
+  EXPECT_EQ(plain.size(), 16u);
+  EXPECT_EQ(fingerprint_of(run(mission(out("a")))), plain);
+  EXPECT_EQ(fingerprint_of(run(mission(out("b") + " --orrery_record=7s"))), plain);
+  EXPECT_EQ(fingerprint_of(run(mission(out("c") + " --orrery_record=off"))), plain);
+  EXPECT_EQ(fingerprint_of(run(mission("--orrery_log=debug"))), plain);
+  const std::string large = "PADDING=" + std::string(20000, 'x');
+  EXPECT_EQ(fingerprint_of(run(mission("", large))), plain);
+  EXPECT_NE(fingerprint_of(run(mission("--orrery_seed=2"))), plain);
+}
+
+// The kernel places stack, heap and libraries anew for each of these runs unless it is told not to.
+TEST_F(MissionDeterminismTest, AddressesChangeNoFingerprint) {
+  const std::string anywhere = fingerprint_of(run(mission("")));
+  const Outcome fixed = run("setarch -R " + mission(""));
+  if (fixed.exit_code != 0 && fixed.text.find("setarch") != std::string::npos) {
+    GTEST_SKIP() << "this machine does not let a program switch address randomisation off";
+  }
+  EXPECT_EQ(fingerprint_of(fixed), anywhere);
+}
+
+TEST_F(MissionDeterminismTest, EqualRunsWriteEqualFiles) {
+  ASSERT_EQ(run(mission(out("a"))).exit_code, 0);
+  ASSERT_EQ(run(mission(out("b"))).exit_code, 0);
+  const auto a = files("a"), b = files("b");
+  ASSERT_GE(a.size(), 9u);  // truth, links and GNSS of both, and the summary
+  ASSERT_EQ(a.size(), b.size());
+  for (const auto& [name, content] : a) {
+    ASSERT_EQ(b.count(name), 1u) << name;
+    EXPECT_FALSE(content.empty()) << name;
+    if (name.find("summary.json") != std::string::npos) {
+      EXPECT_EQ(without_host_times(b.at(name)), without_host_times(content));
+    } else {
+      EXPECT_TRUE(b.at(name) == content) << name;  // megabytes: do not print them
+    }
+  }
+}
