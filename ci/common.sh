@@ -49,10 +49,11 @@ step() {
   log=$logs/$(printf '%s' "$title" | tr -cs 'a-zA-Z0-9+\n' '_').log
   printf -- '-- %s\n' "$title"
   start=$SECONDS
+  set -m   # a process group of its own, so that an interrupt ends all of it
   "$@" >"$log" 2>&1 </dev/null &
   local pid=$!
-  # A shell without job control starts its background processes deaf to ctrl-C.
-  trap 'kill "$pid" 2>/dev/null; exit 130' INT TERM
+  set +m
+  trap 'kill -- -"$pid" 2>/dev/null; exit 130' INT TERM
   watch_progress $pid "$log"
   wait $pid || fail_step "$title" "$log" "$*"
   trap - INT TERM
