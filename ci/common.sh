@@ -90,6 +90,7 @@ summary() {
 
 # ccache makes the second build short. It is used where it is installed, never required.
 if command -v ccache >/dev/null; then
+  export CCACHE_SLOPPINESS=${CCACHE_SLOPPINESS-pch_defines,time_macros}   # or precompiled headers defeat it
   export CMAKE_C_COMPILER_LAUNCHER=${CMAKE_C_COMPILER_LAUNCHER-ccache}
   export CMAKE_CXX_COMPILER_LAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER-ccache}
 fi
