@@ -108,8 +108,11 @@ struct OrbitDynamics::Evaluation {
   Vec3 perturbation_ECI;
 };
 
-OrbitDynamics::OrbitDynamics(std::shared_ptr<const SpaceEnvironment> environment, Forces forces)
-    : environment_(std::move(environment)), forces_(std::move(forces)) {
+OrbitDynamics::OrbitDynamics(std::shared_ptr<const SpaceEnvironment> environment, Forces forces,
+                             std::shared_ptr<const AttitudeLaw> attitude)
+    : environment_(std::move(environment)),
+      forces_(std::move(forces)),
+      attitude_(std::move(attitude)) {
   if (environment_ == nullptr) throw std::invalid_argument("OrbitDynamics: no environment given");
   for (const auto& force : forces_) {
     if (force == nullptr) throw std::invalid_argument("OrbitDynamics: a force is null");
@@ -124,9 +127,18 @@ OrbitDynamics::Evaluation OrbitDynamics::evaluate(SimTime t, const QuasiNonsingu
   e.state = inertial_state_at(g, x);
   const OrbitState orbit{t, e.state.r_ECI, e.state.v_ECI, mass_kg};
   for (const auto& force : forces_) e.perturbation_ECI += force->acceleration_ECI(orbit, around);
+  if (!thrust_.is_off()) e.perturbation_ECI += thrust_acceleration_ECI(orbit);
   const Vec3& f = e.perturbation_ECI;
   e.rate = gauss(g, x, {dot(g.R_ECI, f), dot(g.T_ECI, f), dot(g.N_ECI, f)});
   return e;
+}
+
+Vec3 OrbitDynamics::thrust_acceleration_ECI(const OrbitState& orbit) const {
+  Vec3 force_ECI = thrust_.force_ECI;
+  if (thrust_.force_B != Vec3{}) {
+    force_ECI += transpose(attitude_->R_BI(orbit.t, inertial_state(orbit))) * thrust_.force_B;
+  }
+  return force_ECI / orbit.mass_kg;
 }
 
 OrbitDynamics::State OrbitDynamics::completed(SimTime t, const QuasiNonsingularElements& x,
@@ -148,11 +160,14 @@ OrbitDynamics::State OrbitDynamics::start(const OrbitState& initial) const {
 
 OrbitDynamics::State OrbitDynamics::step(const State& from, SimTime to) const {
   const Duration span = to - from.orbit.t;
-  const double dt_s = to_seconds(span), mass_kg = from.orbit.mass_kg;
+  const double dt_s = to_seconds(span);
+  const double mass_in_middle_kg = from.orbit.mass_kg - thrust_.mass_flow_kgps * (dt_s / 2);
+  const double mass_at_end_kg = from.orbit.mass_kg - thrust_.mass_flow_kgps * dt_s;
+  if (!(mass_at_end_kg > 0)) throw PropagationError("a thrust used up all mass", from.orbit);
   const SimTime middle = from.orbit.t + span / 2;
   // A force that is switched at `to` still has its old value on the way there.
   const SimTime just_before = to - 1ns;
-  const auto rate_at = [&](SimTime t, const QuasiNonsingularElements& x,
+  const auto rate_at = [&](SimTime t, const QuasiNonsingularElements& x, double mass_kg,
                            const Surroundings& around) {
     // Before the forces see it: a field need not converge below the ground.
     if (!is_flyable(x)) throw PropagationError("the orbit is no longer an ellipse", from.orbit);
@@ -164,17 +179,20 @@ OrbitDynamics::State OrbitDynamics::step(const State& from, SimTime to) const {
   const Surroundings at_end = environment_->surroundings(to);
   const QuasiNonsingularElements& x = from.elements;
   const QuasiNonsingularElements& k1 = from.rate;
-  const QuasiNonsingularElements k2 = rate_at(middle, plus(x, dt_s / 2, k1), in_middle);
-  const QuasiNonsingularElements k3 = rate_at(middle, plus(x, dt_s / 2, k2), in_middle);
-  const QuasiNonsingularElements k4 = rate_at(just_before, plus(x, dt_s, k3), at_end);
+  const QuasiNonsingularElements k2 =
+      rate_at(middle, plus(x, dt_s / 2, k1), mass_in_middle_kg, in_middle);
+  const QuasiNonsingularElements k3 =
+      rate_at(middle, plus(x, dt_s / 2, k2), mass_in_middle_kg, in_middle);
+  const QuasiNonsingularElements k4 =
+      rate_at(just_before, plus(x, dt_s, k3), mass_at_end_kg, at_end);
   QuasiNonsingularElements next = plus(x, dt_s / 6, weighted(k1, k2, k3, k4));
   next.u_rad = unwound(next.u_rad);
   if (!is_flyable(next)) throw PropagationError("the orbit is no longer an ellipse", from.orbit);
   if (solve_kepler(next).r_m < kRadiusEarth_m)
     throw PropagationError("the orbit went below the ground", from.orbit);
-  State end = completed(to, next, mass_kg, at_end);
+  State end = completed(to, next, mass_at_end_kg, at_end);
   if (next_discontinuity(from.orbit.t) == to) {
-    end.a_before_ECI = evaluate(just_before, next, mass_kg, at_end).perturbation_ECI +
+    end.a_before_ECI = evaluate(just_before, next, mass_at_end_kg, at_end).perturbation_ECI +
                        point_mass_ECI(end.orbit.r_ECI);
   }
   return end;
@@ -197,29 +215,84 @@ OrbitDynamics::State OrbitDynamics::after_impulse(const State& at, const Vec3& d
   return next;
 }
 
-OrbitState OrbitDynamics::interpolate(const State& a, const State& b, SimTime t) {
-  const double h = to_seconds(b.orbit.t - a.orbit.t);
-  const double dt = to_seconds(t - a.orbit.t);
+void OrbitDynamics::check_thrust(const Thrust& thrust) const {
+  if (!is_finite(thrust.force_B) || !is_finite(thrust.force_ECI) ||
+      !std::isfinite(thrust.nozzle_N)) {
+    throw std::invalid_argument("OrbitDynamics::set_thrust: a force that is not finite");
+  }
+  if (!(thrust.mass_flow_kgps >= 0 && std::isfinite(thrust.mass_flow_kgps))) {
+    throw std::invalid_argument(
+        "OrbitDynamics::set_thrust: mass_flow_kgps = " + std::to_string(thrust.mass_flow_kgps) +
+        " kg/s; accepted: 0 or more");
+  }
+  if (thrust.force_B != Vec3{} && attitude_ == nullptr) {
+    throw std::invalid_argument("OrbitDynamics::set_thrust: a body-fixed force needs an attitude");
+  }
+}
+
+void OrbitDynamics::set_thrust(const Thrust& thrust) {
+  check_thrust(thrust);
+  thrust_ = thrust;
+}
+
+OrbitDynamics::State OrbitDynamics::under_new_thrust(const State& at) const {
+  State next =
+      completed(at.orbit.t, at.elements, at.orbit.mass_kg, environment_->surroundings(at.orbit.t));
+  next.orbit = at.orbit;  // to the bit, after an impulse too
+  next.a_before_ECI = at.a_before_ECI;
+  return next;
+}
+
+namespace {
+
+// r = r_a + v_a dt + a_a dt^2/2 + s^3 (c3 + c4 s + c5 s^2), s = dt/h: the c match position,
+// velocity and acceleration at b.
+InertialState quintic(const OrbitDynamics::State& a, const OrbitDynamics::State& b, double h,
+                      double dt) {
   const double s = dt / h;
-  // r = r_a + v_a dt + a_a dt^2/2 + s^3 (c3 + c4 s + c5 s^2): the c match position, velocity and
-  // acceleration at b.
   const Vec3 dr = b.orbit.r_ECI - a.orbit.r_ECI - h * a.orbit.v_ECI - (0.5 * h * h) * a.a_ECI;
   const Vec3 dv = h * (b.orbit.v_ECI - a.orbit.v_ECI - h * a.a_ECI);
   const Vec3 da = (h * h) * (b.a_before_ECI - a.a_ECI);
   const Vec3 c3 = 10 * dr - 4 * dv + 0.5 * da;
   const Vec3 c4 = -15 * dr + 7 * dv - da;
   const Vec3 c5 = 6 * dr - 3 * dv + 0.5 * da;
-  const Vec3 r = a.orbit.r_ECI + dt * a.orbit.v_ECI + (0.5 * dt * dt) * a.a_ECI +
-                 (s * s * s) * (c3 + s * (c4 + s * c5));
-  const Vec3 v =
-      a.orbit.v_ECI + dt * a.a_ECI + (s * s / h) * (3 * c3 + s * (4 * c4 + (5 * s) * c5));
-  return {t, r, v, a.orbit.mass_kg};
+  return {a.orbit.r_ECI + dt * a.orbit.v_ECI + (0.5 * dt * dt) * a.a_ECI +
+              (s * s * s) * (c3 + s * (c4 + s * c5)),
+          a.orbit.v_ECI + dt * a.a_ECI + (s * s / h) * (3 * c3 + s * (4 * c4 + (5 * s) * c5))};
+}
+
+// v = v_a + a_a dt + s^2 (c2 + c3 s): the c match velocity and acceleration at b; r its integral.
+InertialState cubic_in_velocity(const OrbitDynamics::State& a, const OrbitDynamics::State& b,
+                                double h, double dt) {
+  const double s = dt / h;
+  const Vec3 dv = b.orbit.v_ECI - a.orbit.v_ECI - h * a.a_ECI;
+  const Vec3 da = h * (b.a_before_ECI - a.a_ECI);
+  const Vec3 c2 = 3 * dv - da;
+  const Vec3 c3 = da - 2 * dv;
+  return {a.orbit.r_ECI + dt * a.orbit.v_ECI + (0.5 * dt * dt) * a.a_ECI +
+              (dt * s * s) * (c2 / 3 + (s / 4) * c3),
+          a.orbit.v_ECI + dt * a.a_ECI + (s * s) * (c2 + s * c3)};
+}
+
+}  // namespace
+
+OrbitState OrbitDynamics::interpolate(const State& a, const State& b, SimTime t) {
+  constexpr double kShort_s = 2;
+  const double h = to_seconds(b.orbit.t - a.orbit.t);
+  const double dt = to_seconds(t - a.orbit.t);
+  const InertialState at = h < kShort_s ? cubic_in_velocity(a, b, h, dt) : quintic(a, b, h, dt);
+  const double lost_kg = b.orbit.mass_kg - a.orbit.mass_kg;
+  return {t, at.r_ECI, at.v_ECI, a.orbit.mass_kg + (dt / h) * lost_kg};
 }
 
 std::optional<SimTime> OrbitDynamics::next_discontinuity(SimTime t) const {
   std::optional<SimTime> first;
   for (const auto& force : forces_) {
     const std::optional<SimTime> next = force->next_discontinuity(t);
+    if (next && (!first || *next < *first)) first = next;
+  }
+  if (thrust_.force_B != Vec3{}) {
+    const std::optional<SimTime> next = attitude_->next_discontinuity(t);
     if (next && (!first || *next < *first)) first = next;
   }
   return first;

@@ -49,7 +49,7 @@ void SpacecraftOrbit::add_force(std::shared_ptr<const ForceModel> force) {
 
 LazySystem<SpacecraftOrbit::Model>& SpacecraftOrbit::system() {
   if (!system_) {
-    OrbitDynamics dynamics(options_.environment, options_.forces);
+    OrbitDynamics dynamics(options_.environment, options_.forces, options_.attitude);
     const OrbitDynamics::State start = dynamics.start(initial_);
     system_.emplace(Model(std::move(dynamics)), start, initial_.t, options_.step);
   }
@@ -76,6 +76,27 @@ void SpacecraftOrbit::apply_impulse(SimTime t, const Vec3& dv_ECI) {
   LazySystem<Model>& orbit = system();
   orbit.discontinuity(t, [&](OrbitDynamics::State& state) {
     state = orbit.model().dynamics().after_impulse(state, dv_ECI);
+    account_.impulse(norm(dv_ECI), state.orbit.mass_kg);
+  });
+}
+
+void SpacecraftOrbit::set_thrust(SimTime t, const Thrust& thrust) {
+  LazySystem<Model>& orbit = system();
+  orbit.model().dynamics().check_thrust(thrust);  // before `t` becomes a grid point
+  orbit.discontinuity(t, [&](OrbitDynamics::State& state) {
+    orbit.model().dynamics().set_thrust(thrust);
+    state = orbit.model().dynamics().under_new_thrust(state);
+    account_.thrust(t, thrust, state.orbit.mass_kg);
+    thrust_ = thrust;
+  });
+}
+
+void SpacecraftOrbit::change_attitude(SimTime t, const std::function<void()>& change) {
+  if (thrust_.force_B == Vec3{}) return change();
+  LazySystem<Model>& orbit = system();
+  orbit.discontinuity(t, [&](OrbitDynamics::State& state) {
+    change();
+    state = orbit.model().dynamics().under_new_thrust(state);
   });
 }
 

@@ -6,6 +6,7 @@
 #include <orrery/models/orbit/orbit_dynamics.hpp>
 
 #include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -18,11 +19,13 @@ struct SpacecraftOrbitOptions {
   /// Besides the point mass, e.g. make_earth_gravity(). Shared with other spacecraft if you like.
   OrbitDynamics::Forces forces = {};
   std::shared_ptr<const SpaceEnvironment> environment = {};  // required
+  /// Turns body-fixed thrust; without it there can be none. Changes only in change_attitude().
+  std::shared_ptr<const AttitudeLaw> attitude = {};
 };
 
-/// A LazySystem of OrbitDynamics: its grid is fixed by `step`, by the impulses and by the
-/// discontinuities of the forces; any pattern of looks gives the same orbit, to the bit. Looks and
-/// impulses come in the order of time.
+/// A LazySystem of OrbitDynamics: its grid is fixed by `step`, by impulses and thrust edges, and by
+/// the discontinuities of the forces; any pattern of looks gives the same orbit, to the bit. Looks,
+/// impulses and edges come in the order of time.
 class SpacecraftOrbit {
  public:
   /// @throws std::invalid_argument  an orbit below the ground or not an ellipse, mass <= 0, step <=
@@ -46,6 +49,21 @@ class SpacecraftOrbit {
   /// Changes the velocity by dv_ECI [m/s] at `t`, which becomes a grid point.
   /// @throws as at(); std::domain_error  dv_ECI not finite; PropagationError  no ellipse any more.
   void apply_impulse(SimTime t, const Vec3& dv_ECI);
+
+  /// From `t` on, which becomes a grid point to the nanosecond, this is the thrust of all nozzles
+  /// together; Thrust{} ends it. The mass falls from then on.
+  /// @throws as at(); std::invalid_argument  as OrbitDynamics::set_thrust. PropagationError, from a
+  ///         later look or edge: the thrust used up all mass.
+  void set_thrust(SimTime t, const Thrust& thrust);
+  const Thrust& thrust() const { return thrust_; }
+
+  /// Runs `change`, which changes the attitude law from `t` on. Under a body-fixed thrust `t`
+  /// becomes a grid point; otherwise the orbit does not depend on the attitude and nothing is
+  /// propagated.
+  void change_attitude(SimTime t, const std::function<void()>& change);
+
+  /// What impulses and thrusts have delivered up to `t`, not before the last of them.
+  Propulsion propulsion(SimTime t) const { return account_.at(t); }
 
   /// Osculating elements at `t`. Errors as at().
   QuasiNonsingularElements elements_at(SimTime t) {
@@ -73,6 +91,7 @@ class SpacecraftOrbit {
       return dynamics_.next_discontinuity(t);
     }
     const OrbitDynamics& dynamics() const { return dynamics_; }
+    OrbitDynamics& dynamics() { return dynamics_; }
     /// From the steps that were kept; empty before the first of them.
     std::optional<OrbitState> kept(SimTime t) const;
 
@@ -89,6 +108,8 @@ class SpacecraftOrbit {
   OrbitState initial_;
   SpacecraftOrbitOptions options_;
   std::optional<LazySystem<Model>> system_;  // from the first look on
+  Thrust thrust_;
+  PropulsionAccount account_;
 };
 
 }  // namespace orrery
