@@ -140,4 +140,10 @@ void append_frame(const Header& header, Bytes body, ByteBuffer& out) {
   out.insert(out.end(), tail.begin(), tail.end());
 }
 
+void append(const Header& header, const BestXyz& message, ByteBuffer& out) {
+  Header with_id = header;
+  with_id.message_id = kBestXyzId;
+  append_frame(with_id, encode(message), out);
+}
+
 }  // namespace orrery::novatel

@@ -75,4 +75,7 @@ std::array<std::byte, kBestXyzBytes> encode(const BestXyz& message);
 /// @throws std::invalid_argument  `header.t` before the GPS epoch; a body above 65535 bytes.
 void append_frame(const Header& header, Bytes body, ByteBuffer& out);
 
+/// The same for a message: its id goes into the header in place of `header.message_id`.
+void append(const Header& header, const BestXyz& message, ByteBuffer& out);
+
 }  // namespace orrery::novatel
