@@ -59,16 +59,17 @@ class LogSchedule {
   /// epoch. Valid until the next call of a member. No allocation once the list has had its longest.
   std::span<const DueLog> due(SimTime t);
 
-  std::span<const LogRequest> requests() const { return requests_; }
+  std::size_t size() const { return entries_.size(); }
 
  private:
-  struct State {
+  struct Entry {
+    LogRequest request;
     bool sent = false;
     bool changed = false;
   };
+  static bool is_due(const Entry& entry, SimTime t);
 
-  std::vector<LogRequest> requests_;
-  std::vector<State> states_;  // of requests_
+  std::vector<Entry> entries_;
   std::vector<DueLog> due_;
 };
 
