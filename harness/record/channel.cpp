@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <ostream>
 #include <stdexcept>
 #include <utility>
 
@@ -24,10 +25,11 @@ std::string_view unit_of(std::string_view name) {
   return std::find(kUnits.begin(), kUnits.end(), word) != kUnits.end() ? word : std::string_view{};
 }
 
-Channel::Channel(std::string name) : name_(std::move(name)), unit_(unit_of(name_)) {}
+Channel::Channel(std::string name, SimTime start)
+    : name_(std::move(name)), unit_(unit_of(name_)), start_(start) {}
 
-Channel::Channel(std::string name, std::string unit)
-    : name_(std::move(name)), unit_(std::move(unit)) {}
+Channel::Channel(std::string name, std::string unit, SimTime start)
+    : name_(std::move(name)), unit_(std::move(unit)), start_(start) {}
 
 double Channel::min() const {
   require_samples("min");
@@ -52,6 +54,17 @@ double Channel::max() const {
 const Channel::Sample& Channel::last() const {
   require_samples("last");
   return samples_.back();
+}
+
+void PrintTo(const Channel& channel, std::ostream* out) {
+  *out << '"' << channel.name() << "\" (";
+  if (channel.empty()) {
+    *out << "no samples)";
+    return;
+  }
+  const std::size_t count = channel.samples().size();
+  *out << count << (count == 1 ? " sample, " : " samples, ") << channel.min() << " to "
+       << channel.max() << (channel.unit().empty() ? "" : " ") << channel.unit() << ')';
 }
 
 void Channel::require_samples(const char* function) const {

@@ -3,6 +3,7 @@
 
 #include <orrery/harness/kernel/time.hpp>
 
+#include <iosfwd>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,9 +23,9 @@ class Channel {
     friend bool operator==(const Sample&, const Sample&) = default;
   };
 
-  /// The unit is that of the name.
-  explicit Channel(std::string name);
-  Channel(std::string name, std::string unit);
+  /// @param start  The world's; windows of matchers count from it. The unit is that of the name.
+  explicit Channel(std::string name, SimTime start = {});
+  Channel(std::string name, std::string unit, SimTime start = {});
 
   /// Any double, NaN included. Times usually increase, but need not: what flight software says of
   /// an earlier instant may come late.
@@ -32,6 +33,7 @@ class Channel {
 
   const std::string& name() const { return name_; }  // "dsc/sun_sensor/angle_rad"
   const std::string& unit() const { return unit_; }
+  SimTime start() const { return start_; }
   const std::vector<Sample>& samples() const { return samples_; }
   bool empty() const { return samples_.empty(); }
 
@@ -46,7 +48,11 @@ class Channel {
   void require_samples(const char* function) const;
 
   std::string name_, unit_;
+  SimTime start_;
   std::vector<Sample> samples_;
 };
+
+/// For GoogleTest's messages: "dsc/sun_sensor/angle_rad" (100 samples, -0.1 to 0.3 rad)
+void PrintTo(const Channel& channel, std::ostream* out);
 
 }  // namespace orrery

@@ -77,6 +77,11 @@ TEST_P(FormationReconfigurationTest, ReachesTheSmallSafeEllipseOverALossyCrossli
   EXPECT_EQ(delta_v_mps("chief"), 0);
   EXPECT_GE(minimum_separation_m, 70);
 
+  // At least as good as the mean of ten raw differences of two receivers' positions, each sqrt(2)
+  // sqrt(3) 1.5 m; observed 0.29 m to 0.31 m. Late and lost messages leave no gap of minutes.
+  EXPECT_THAT(relative_navigation_error("deputy"),
+              testing::AllOf(RmsBelow(1.16, from(30min)), NoGapLongerThan(5min, from(30min))));
+
   // The crosslink really was as bad as it should be.
   const LinkHandle link = crosslink("chief", "deputy");
   EXPECT_GE(link.lost(), 300);
