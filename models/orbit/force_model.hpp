@@ -4,6 +4,8 @@
 #include <orrery/harness/kernel/time.hpp>
 #include <orrery/models/frames/vector.hpp>
 
+#include <array>
+#include <limits>
 #include <optional>
 #include <string_view>
 
@@ -38,6 +40,45 @@ class ForceModel {
   virtual std::optional<SimTime> next_discontinuity(SimTime t) const {
     (void)t;
     return {};
+  }
+};
+
+/// What a force keeps along one orbit, from one grid point to the next: part of the integrator's
+/// state, so that the force itself stays pure and may serve several orbits. A force uses of it what
+/// it needs.
+struct ForceMemory {
+  int region = 0;  // e.g. sunlight, penumbra, umbra
+  std::array<SimTime, 4> instants{};
+  std::array<double, 9> numbers{};
+};
+
+/// A force with edges in space, where it jumps or has a kink as at the edge of a shadow, or one
+/// that is interpolated along the orbit. The integrator ends a step where the orbit meets an edge,
+/// root-found to the nanosecond, and holds the memory constant within a step.
+///
+/// The two-argument acceleration_ECI() of ForceModel is the force itself, without any memory.
+class ForceAlongOrbit : public ForceModel {
+ public:
+  using ForceModel::acceleration_ECI;
+
+  /// At the first grid point, and after an impulse.
+  virtual ForceMemory begin(const OrbitState&, const Surroundings&) const = 0;
+  /// At each later grid point, for the step that begins there.
+  virtual ForceMemory next(const ForceMemory& memory, const OrbitState&,
+                           const Surroundings&) const {
+    return memory;
+  }
+  virtual Vec3 acceleration_ECI(const OrbitState&, const Surroundings&,
+                                const ForceMemory&) const = 0;
+  /// Positive inside the memory's region, zero on its edge, negative beyond; continuous along an
+  /// orbit.
+  virtual double margin(const OrbitState&, const Surroundings&, const ForceMemory&) const {
+    return std::numeric_limits<double>::infinity();
+  }
+  /// The memory beyond the edge, at a state on it.
+  virtual ForceMemory crossed(const ForceMemory& memory, const OrbitState&,
+                              const Surroundings&) const {
+    return memory;
   }
 };
 
