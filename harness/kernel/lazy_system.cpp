@@ -31,4 +31,10 @@ void LazyGrid::require_not_past(const char* function, SimTime t, SimTime committ
                          " is before the last committed point, " + to_string(committed));
 }
 
+SimTime LazyGrid::require_within(SimTime from, SimTime edge, SimTime to) {
+  if (from < edge && edge <= to) return edge;
+  throw std::logic_error("LazySystem: the model's crossing at " + to_string(edge) +
+                         " is not in the step from " + to_string(from) + " to " + to_string(to));
+}
+
 }  // namespace orrery::internal

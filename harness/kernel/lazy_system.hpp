@@ -1,10 +1,11 @@
 /// A continuous system that is propagated only when somebody looks, on a grid that does not depend
 /// on who looks.
 ///
-/// Grid    start + k * step, cut at discontinuities: those the model announces, and those that
-///         happen (an impulse, a thruster that opens). After a cut the next point is on the fixed
-///         grid again. The states at these points are the truth: each follows from the one before
-///         by one call of Model::step, whatever was looked at.
+/// Grid    start + k * step, cut at discontinuities: those the model announces, those that happen
+///         (an impulse, a thruster that opens), and those the state itself runs into (the edge of
+///         a shadow). After a cut the next point is on the fixed grid again. The states at these
+///         points are the truth: each follows from the one before by one call of Model::step,
+///         whatever was looked at.
 /// Looks   Between two points a look is interpolated, towards the next point as it will be if
 ///         nothing happens. That point is kept, and becomes truth when its time has come, or is
 ///         dropped when a discontinuity comes first. Hence a look costs at most one step ahead, and
@@ -38,6 +39,20 @@ concept ContinuousModel = requires(M& model, const typename M::State& x, SimTime
   { model.next_discontinuity(t) } -> std::convertible_to<std::optional<SimTime>>;
 };
 
+/// A model whose state may meet edges. After a trial step from a to b:
+///
+///   has_edges whether there are any; without, no step is made for their sake.
+///   crossing  the first edge met in (t_a, t_b], if there is one; `.t` is its instant. The point
+///             is put there, by a step of its own.
+///   beyond    the state at that point as the next step starts from it. A look before the point is
+///             interpolated towards it, so nothing that interpolate() uses of its end may change.
+template <class M>
+concept ModelWithEdges = ContinuousModel<M> &&
+    requires(M& model, const typename M::State& x, SimTime t) {
+  { model.crossing(x, t, x, t)->t } -> std::convertible_to<SimTime>;
+  { model.beyond(x, *model.crossing(x, t, x, t)) } -> std::convertible_to<typename M::State>;
+};
+
 namespace internal {
 
 /// What does not depend on the model: the grid, and the messages.
@@ -51,6 +66,8 @@ class LazyGrid {
   SimTime next(SimTime t, std::optional<SimTime> discontinuity) const;
   /// @throws std::logic_error  t before `committed`; gives both.
   static void require_not_past(const char* function, SimTime t, SimTime committed);
+  /// `edge`. @throws std::logic_error  it is not in (from, to].
+  static SimTime require_within(SimTime from, SimTime edge, SimTime to);
 
  private:
   SimTime start_;
@@ -102,15 +119,18 @@ class LazySystem {
   /// To be changed within discontinuity() only.
   Model& model() { return model_; }
 
-  /// Calls of Model::step so far; those that a discontinuity made useless are counted.
+  /// Calls of Model::step so far; those that a discontinuity or an edge made useless are counted.
   std::uint64_t steps() const { return steps_; }
   std::uint64_t interpolations() const { return interpolations_; }
 
  private:
   void commit_until(SimTime t) {
-    if (t == t_) return;  // asks the model nothing
-    while (next_time() <= t) {
+    while (t_ < t) {  // nothing is asked of the model for t itself
+      // Where the next edge is shows only when the whole step has been tried; that step must not
+      // depend on who looks, so it is the one to the grid point.
+      if (!has_edges() && next_time() > t) return;
       ahead();
+      if (next_time() > t) return;
       commit(std::move(*ahead_), *next_t_);
     }
   }
@@ -121,8 +141,24 @@ class LazySystem {
   }
 
   const State& ahead() {
-    if (!ahead_) ahead_ = propagate(next_time());
+    if (ahead_) return *ahead_;
+    ahead_ = propagate(next_time());
+    if constexpr (ModelWithEdges<Model>) {
+      if (has_edges()) cut_at_edge();
+    }
     return *ahead_;
+  }
+
+  bool has_edges() const {
+    if constexpr (ModelWithEdges<Model>) return model_.has_edges();
+    return false;
+  }
+
+  void cut_at_edge() {
+    const auto edge = model_.crossing(x_, t_, *ahead_, *next_t_);
+    if (!edge) return;
+    next_t_ = internal::LazyGrid::require_within(t_, edge->t, *next_t_);
+    ahead_ = model_.beyond(propagate(*next_t_), *edge);
   }
 
   State propagate(SimTime to) {

@@ -1,4 +1,5 @@
 #include <orrery/models/atmosphere/nrlmsise00_atmosphere.hpp>
+#include <orrery/models/atmosphere/nrlmsise00_tables.hpp>
 #include <orrery/models/frames/geodetic.hpp>
 
 #include <algorithm>
@@ -9,7 +10,12 @@ namespace orrery {
 namespace {
 
 constexpr double k1970_JD = 2440587.5;
-constexpr double kDegreesPerRadian = 57.29577951308232;
+
+// The model turns degrees and hours into angles by rounded rates, 1.74533e-2 and 0.2618: 24 h are a
+// turn and 1.5e-5 rad, so that density jumps by 1e-5 where local time or longitude begins anew.
+// These give it the angles that are meant, in units of its own.
+constexpr double kDegreesPerRadian = 1 / nrlmsise00::kDegree_rad;
+constexpr double kHoursPerHour = 3.141592653589793 / 12 / nrlmsise00::kHour_rad;
 
 int day_of_year(const JulianDate& utc) {
   const std::chrono::sys_days day{std::chrono::days(static_cast<int>(utc.day - k1970_JD))};
@@ -17,9 +23,9 @@ int day_of_year(const JulianDate& utc) {
   return static_cast<int>((day - std::chrono::sys_days(year / 1 / 1)).count()) + 1;
 }
 
-double local_solar_time_h(double utc_s, double longitude_deg) {
-  const double hours = utc_s / 3600 + longitude_deg / 15;
-  return hours < 0 ? hours + 24 : hours >= 24 ? hours - 24 : hours;
+double local_solar_time_h(double utc_s, double longitude_rad) {
+  const double hours = utc_s / 3600 + longitude_rad * (12 / 3.141592653589793);
+  return kHoursPerHour * (hours < 0 ? hours + 24 : hours >= 24 ? hours - 24 : hours);
 }
 
 }  // namespace
@@ -42,7 +48,7 @@ Nrlmsise00Input Nrlmsise00Atmosphere::arguments(SimTime t, const Vec3& r_ECEF) c
           .altitude_km = 1e-3 * place.height_m,
           .latitude_deg = latitude_deg,
           .longitude_deg = longitude_deg,
-          .local_solar_time_h = local_solar_time_h(utc_s, longitude_deg),
+          .local_solar_time_h = local_solar_time_h(utc_s, place.longitude_rad),
           .f107a_sfu = weather.f107a_sfu,
           .f107_sfu = weather.f107_sfu,
           .ap_daily = weather.ap_daily,

@@ -48,6 +48,11 @@ class DragForce final : public ForceAlongOrbit {
   ForceMemory begin(const OrbitState& state, const Surroundings& around) const override;
   ForceMemory next(const ForceMemory& memory, const OrbitState& state,
                    const Surroundings& around) const override;
+  /// Knots on the new orbit.
+  ForceMemory after_impulse(const ForceMemory&, const OrbitState& state,
+                            const Surroundings& around) const override {
+    return begin(state, around);
+  }
   /// With the interpolated density; beyond the knots with the atmosphere's own.
   Vec3 acceleration_ECI(const OrbitState& state, const Surroundings& around,
                         const ForceMemory& memory) const override;

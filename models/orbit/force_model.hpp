@@ -54,22 +54,30 @@ struct ForceMemory {
 
 /// A force with edges in space, where it jumps or has a kink as at the edge of a shadow, or one
 /// that is interpolated along the orbit. The integrator ends a step where the orbit meets an edge,
-/// root-found to the nanosecond, and holds the memory constant within a step.
+/// root-found to the nanosecond, and holds the memory constant within a step. An edge that is met
+/// and left again within one step is passed over.
 ///
 /// The two-argument acceleration_ECI() of ForceModel is the force itself, without any memory.
 class ForceAlongOrbit : public ForceModel {
  public:
   using ForceModel::acceleration_ECI;
 
-  /// At the first grid point, and after an impulse.
+  /// At the first grid point.
   virtual ForceMemory begin(const OrbitState&, const Surroundings&) const = 0;
   /// At each later grid point, for the step that begins there.
   virtual ForceMemory next(const ForceMemory& memory, const OrbitState&,
                            const Surroundings&) const {
     return memory;
   }
+  /// When an impulse has just changed the orbit.
+  virtual ForceMemory after_impulse(const ForceMemory& memory, const OrbitState&,
+                                    const Surroundings&) const {
+    return memory;
+  }
   virtual Vec3 acceleration_ECI(const OrbitState&, const Surroundings&,
                                 const ForceMemory&) const = 0;
+  /// Whether margin() is ever to be asked. The same for the whole run.
+  virtual bool has_edges() const { return false; }
   /// Positive inside the memory's region, zero on its edge, negative beyond; continuous along an
   /// orbit.
   virtual double margin(const OrbitState&, const Surroundings&, const ForceMemory&) const {

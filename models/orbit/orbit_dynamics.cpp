@@ -1,7 +1,9 @@
 #include <orrery/models/orbit/orbit_dynamics.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 namespace orrery {
 namespace {
@@ -96,41 +98,116 @@ bool is_flyable(const QuasiNonsingularElements& x) {
          std::sin(x.i_rad) > 1e-9;
 }
 
+// f(inside) > 0 >= f(beyond); the first of two neighbouring nanoseconds beyond the root between
+// them. Secants, every third time halves.
+template <class F>
+SimTime narrowed_root(SimTime inside, double at_inside, SimTime beyond, double at_beyond,
+                      const F& f) {
+  for (int k = 1; beyond - inside > 1ns; ++k) {
+    const Duration width = beyond - inside;
+    const double share = k % 3 == 0 ? 0.5 : at_inside / (at_inside - at_beyond);
+    Duration ahead = width / 2;
+    if (share >= 0 && share <= 1) {
+      ahead = Duration(static_cast<std::int64_t>(share * static_cast<double>(width.count())));
+    }
+    const SimTime t = inside + std::clamp(ahead, Duration(1ns), width - 1ns);
+    const double here = f(t);
+    if (here > 0) {
+      inside = t, at_inside = here;
+    } else {
+      beyond = t, at_beyond = here;
+    }
+  }
+  return beyond;
+}
+
+// The first instant after `from` at which f is no longer positive, to the nanosecond; f(to) is not.
+// In parts of a sixteenth of the way, since the way may begin on an edge where f is zero.
+template <class F>
+SimTime first_root(SimTime from, SimTime to, const F& f) {
+  SimTime inside = from;
+  double at_inside = 0;
+  for (int part = 1; part <= 16; ++part) {
+    const SimTime t = part == 16 ? to : from + (to - from) / 16 * part;
+    if (t <= from) continue;
+    const double here = f(t);
+    if (here > 0) {
+      inside = t, at_inside = here;
+    } else if (at_inside > 0 || part == 16) {
+      return narrowed_root(inside, at_inside, t, here, f);
+    }
+  }
+  return to;
+}
+
 }  // namespace
 
 PropagationError::PropagationError(const std::string& what, const OrbitState& state)
     : std::runtime_error("propagation: " + what + "; last good state: " + describe(state)),
       state_(state) {}
 
-struct OrbitDynamics::Evaluation {
-  InertialState state;
-  QuasiNonsingularElements rate;
-  Vec3 perturbation_ECI;
+struct OrbitDynamics::Point {
+  QuasiNonsingularElements elements;
+  Geometry geometry;
+  OrbitState orbit;
+
+  QuasiNonsingularElements rate(const Vec3& perturbation_ECI) const {
+    const Vec3& f = perturbation_ECI;
+    return gauss(geometry, elements,
+                 {dot(geometry.R_ECI, f), dot(geometry.T_ECI, f), dot(geometry.N_ECI, f)});
+  }
 };
 
 OrbitDynamics::OrbitDynamics(std::shared_ptr<const SpaceEnvironment> environment, Forces forces,
                              std::shared_ptr<const AttitudeLaw> attitude)
-    : environment_(std::move(environment)),
-      forces_(std::move(forces)),
-      attitude_(std::move(attitude)) {
+    : environment_(std::move(environment)), attitude_(std::move(attitude)) {
   if (environment_ == nullptr) throw std::invalid_argument("OrbitDynamics: no environment given");
-  for (const auto& force : forces_) {
-    if (force == nullptr) throw std::invalid_argument("OrbitDynamics: a force is null");
+  std::size_t slots = 0;
+  for (auto& model : forces) {
+    if (model == nullptr) throw std::invalid_argument("OrbitDynamics: a force is null");
+    Force force{std::move(model)};
+    force.along_orbit = dynamic_cast<const ForceAlongOrbit*>(force.model.get());
+    if (force.along_orbit != nullptr) {
+      force.slot = slots++;
+      has_edges_ = has_edges_ || force.along_orbit->has_edges();
+    }
+    forces_.push_back(std::move(force));
+  }
+  if (slots > kMostForcesAlongOrbit) {
+    throw std::invalid_argument("OrbitDynamics: " + std::to_string(slots) +
+                                " forces with a memory along the orbit; accepted: up to " +
+                                std::to_string(kMostForcesAlongOrbit));
   }
 }
 
-OrbitDynamics::Evaluation OrbitDynamics::evaluate(SimTime t, const QuasiNonsingularElements& x,
-                                                  double mass_kg,
-                                                  const Surroundings& around) const {
+OrbitDynamics::Point OrbitDynamics::point(SimTime t, const QuasiNonsingularElements& x,
+                                          double mass_kg) {
   const Geometry g = geometry(x);
-  Evaluation e;
-  e.state = inertial_state_at(g, x);
-  const OrbitState orbit{t, e.state.r_ECI, e.state.v_ECI, mass_kg};
-  for (const auto& force : forces_) e.perturbation_ECI += force->acceleration_ECI(orbit, around);
-  if (!thrust_.is_off()) e.perturbation_ECI += thrust_acceleration_ECI(orbit);
-  const Vec3& f = e.perturbation_ECI;
-  e.rate = gauss(g, x, {dot(g.R_ECI, f), dot(g.T_ECI, f), dot(g.N_ECI, f)});
-  return e;
+  const InertialState s = inertial_state_at(g, x);
+  return {x, g, {t, s.r_ECI, s.v_ECI, mass_kg}};
+}
+
+OrbitDynamics::Point OrbitDynamics::checked_point(SimTime t, const QuasiNonsingularElements& x,
+                                                  double mass_kg, const State& from) {
+  // Before the forces see it: a field need not converge below the ground.
+  if (!is_flyable(x)) throw PropagationError("the orbit is no longer an ellipse", from.orbit);
+  const Point at = point(t, x, mass_kg);
+  if (at.geometry.point.r_m < kRadiusEarth_m) {
+    throw PropagationError("the orbit went below the ground", from.orbit);
+  }
+  return at;
+}
+
+Vec3 OrbitDynamics::perturbation_ECI(const Point& at, const Surroundings& around,
+                                     const Memories& memories) const {
+  Vec3 sum_ECI;
+  for (const Force& force : forces_) {
+    sum_ECI += force.along_orbit != nullptr
+                   ? force.along_orbit->acceleration_ECI(at.orbit, around, memories[force.slot])
+                   : force.model->acceleration_ECI(at.orbit, around);
+  }
+  if (!thrust_.is_off()) sum_ECI += thrust_acceleration_ECI(at.orbit);
+  return sum_ECI;
 }
 
 Vec3 OrbitDynamics::thrust_acceleration_ECI(const OrbitState& orbit) const {
@@ -141,11 +218,11 @@ Vec3 OrbitDynamics::thrust_acceleration_ECI(const OrbitState& orbit) const {
   return force_ECI / orbit.mass_kg;
 }
 
-OrbitDynamics::State OrbitDynamics::completed(SimTime t, const QuasiNonsingularElements& x,
-                                              double mass_kg, const Surroundings& around) const {
-  const Evaluation e = evaluate(t, x, mass_kg, around);
-  const Vec3 a_ECI = e.perturbation_ECI + point_mass_ECI(e.state.r_ECI);
-  return {{t, e.state.r_ECI, e.state.v_ECI, mass_kg}, x, e.rate, a_ECI, a_ECI};
+OrbitDynamics::State OrbitDynamics::completed(const Point& at, const Surroundings& around,
+                                              const Memories& memories) const {
+  const Vec3 f_ECI = perturbation_ECI(at, around, memories);
+  const Vec3 a_ECI = f_ECI + point_mass_ECI(at.orbit.r_ECI);
+  return {at.orbit, at.elements, at.rate(f_ECI), a_ECI, a_ECI, memories};
 }
 
 OrbitDynamics::State OrbitDynamics::start(const OrbitState& initial) const {
@@ -155,10 +232,25 @@ OrbitDynamics::State OrbitDynamics::start(const OrbitState& initial) const {
   }
   const QuasiNonsingularElements x = to_quasi_nonsingular(inertial_state(initial));
   require_above_ground(x, "OrbitDynamics::start");
-  return completed(initial.t, x, initial.mass_kg, environment_->surroundings(initial.t));
+  const Point at = point(initial.t, x, initial.mass_kg);
+  const Surroundings around = environment_->surroundings(initial.t);
+  Memories memories;
+  for (const Force& force : forces_) {
+    if (force.along_orbit == nullptr) continue;
+    memories[force.slot] = force.along_orbit->begin(at.orbit, around);
+  }
+  return completed(at, around, memories);
 }
 
 OrbitDynamics::State OrbitDynamics::step(const State& from, SimTime to) const {
+  try {
+    return stepped(from, to);
+  } catch (const std::logic_error& error) {
+    throw PropagationError(error.what(), from.orbit);
+  }
+}
+
+OrbitDynamics::State OrbitDynamics::stepped(const State& from, SimTime to) const {
   const Duration span = to - from.orbit.t;
   const double dt_s = to_seconds(span);
   const double mass_in_middle_kg = from.orbit.mass_kg - thrust_.mass_flow_kgps * (dt_s / 2);
@@ -169,11 +261,8 @@ OrbitDynamics::State OrbitDynamics::step(const State& from, SimTime to) const {
   const SimTime just_before = to - 1ns;
   const auto rate_at = [&](SimTime t, const QuasiNonsingularElements& x, double mass_kg,
                            const Surroundings& around) {
-    // Before the forces see it: a field need not converge below the ground.
-    if (!is_flyable(x)) throw PropagationError("the orbit is no longer an ellipse", from.orbit);
-    if (solve_kepler(x).r_m < kRadiusEarth_m)
-      throw PropagationError("the orbit went below the ground", from.orbit);
-    return evaluate(t, x, mass_kg, around).rate;
+    const Point at = checked_point(t, x, mass_kg, from);
+    return at.rate(perturbation_ECI(at, around, from.memories));
   };
   const Surroundings in_middle = environment_->surroundings(middle);
   const Surroundings at_end = environment_->surroundings(to);
@@ -187,15 +276,55 @@ OrbitDynamics::State OrbitDynamics::step(const State& from, SimTime to) const {
       rate_at(just_before, plus(x, dt_s, k3), mass_at_end_kg, at_end);
   QuasiNonsingularElements next = plus(x, dt_s / 6, weighted(k1, k2, k3, k4));
   next.u_rad = unwound(next.u_rad);
-  if (!is_flyable(next)) throw PropagationError("the orbit is no longer an ellipse", from.orbit);
-  if (solve_kepler(next).r_m < kRadiusEarth_m)
-    throw PropagationError("the orbit went below the ground", from.orbit);
-  State end = completed(to, next, mass_at_end_kg, at_end);
-  if (next_discontinuity(from.orbit.t) == to) {
-    end.a_before_ECI = evaluate(just_before, next, mass_at_end_kg, at_end).perturbation_ECI +
-                       point_mass_ECI(end.orbit.r_ECI);
+
+  Point end = checked_point(to, next, mass_at_end_kg, from);
+  Memories memories = from.memories;
+  for (const Force& force : forces_) {
+    if (force.along_orbit == nullptr) continue;
+    memories[force.slot] = force.along_orbit->next(from.memories[force.slot], end.orbit, at_end);
   }
-  return end;
+  State state = completed(end, at_end, memories);
+  if (next_discontinuity(from.orbit.t) == to) {
+    end.orbit.t = just_before;
+    state.a_before_ECI =
+        perturbation_ECI(end, at_end, from.memories) + point_mass_ECI(end.orbit.r_ECI);
+  }
+  return state;
+}
+
+std::optional<OrbitDynamics::Crossing> OrbitDynamics::crossing(const State& a,
+                                                               const State& b) const {
+  std::optional<Crossing> first;
+  for (std::size_t k = 0; k < forces_.size(); ++k) {
+    if (forces_[k].along_orbit == nullptr || !forces_[k].along_orbit->has_edges()) continue;
+    const std::optional<SimTime> t = edge_of(forces_[k], a, b);
+    if (t && (!first || *t < first->t)) first = Crossing{*t, k};
+  }
+  return first;
+}
+
+std::optional<SimTime> OrbitDynamics::edge_of(const Force& force, const State& a,
+                                              const State& b) const {
+  const ForceMemory& memory = a.memories[force.slot];
+  const auto margin = [&](const OrbitState& state) {
+    return force.along_orbit->margin(state, environment_->surroundings(state.t), memory);
+  };
+  const double at_end = margin(b.orbit);
+  if (at_end > 0) return {};
+  const auto margin_at = [&](SimTime t) {
+    return t == b.orbit.t ? at_end : margin(interpolate(a, b, t));
+  };
+  return first_root(a.orbit.t, b.orbit.t, margin_at);
+}
+
+OrbitDynamics::State OrbitDynamics::beyond(const State& at, const Crossing& crossing) const {
+  const Force& force = forces_[crossing.force];
+  const Surroundings around = environment_->surroundings(at.orbit.t);
+  Memories memories = at.memories;
+  memories[force.slot] = force.along_orbit->crossed(at.memories[force.slot], at.orbit, around);
+  State next = completed(point(at.orbit.t, at.elements, at.orbit.mass_kg), around, memories);
+  next.a_before_ECI = at.a_before_ECI;
+  return next;
 }
 
 OrbitDynamics::State OrbitDynamics::after_impulse(const State& at, const Vec3& dv_ECI) const {
@@ -208,7 +337,15 @@ OrbitDynamics::State OrbitDynamics::after_impulse(const State& at, const Vec3& d
   } catch (const std::invalid_argument& error) {
     throw PropagationError(std::string("impulse: ") + error.what(), at.orbit);
   }
-  State next = completed(at.orbit.t, x, at.orbit.mass_kg, environment_->surroundings(at.orbit.t));
+  const Point after = point(at.orbit.t, x, at.orbit.mass_kg);
+  const Surroundings around = environment_->surroundings(at.orbit.t);
+  Memories memories = at.memories;
+  for (const Force& force : forces_) {
+    if (force.along_orbit == nullptr) continue;
+    memories[force.slot] =
+        force.along_orbit->after_impulse(at.memories[force.slot], after.orbit, around);
+  }
+  State next = completed(after, around, memories);
   // To the bit what the caller added: the detour over the elements rounds.
   next.orbit.v_ECI = kicked.v_ECI;
   next.orbit.r_ECI = kicked.r_ECI;
@@ -236,8 +373,8 @@ void OrbitDynamics::set_thrust(const Thrust& thrust) {
 }
 
 OrbitDynamics::State OrbitDynamics::under_new_thrust(const State& at) const {
-  State next =
-      completed(at.orbit.t, at.elements, at.orbit.mass_kg, environment_->surroundings(at.orbit.t));
+  State next = completed(point(at.orbit.t, at.elements, at.orbit.mass_kg),
+                         environment_->surroundings(at.orbit.t), at.memories);
   next.orbit = at.orbit;  // to the bit, after an impulse too
   next.a_before_ECI = at.a_before_ECI;
   return next;
@@ -287,8 +424,8 @@ OrbitState OrbitDynamics::interpolate(const State& a, const State& b, SimTime t)
 
 std::optional<SimTime> OrbitDynamics::next_discontinuity(SimTime t) const {
   std::optional<SimTime> first;
-  for (const auto& force : forces_) {
-    const std::optional<SimTime> next = force->next_discontinuity(t);
+  for (const Force& force : forces_) {
+    const std::optional<SimTime> next = force.model->next_discontinuity(t);
     if (next && (!first || *next < *first)) first = next;
   }
   if (thrust_.force_B != Vec3{}) {

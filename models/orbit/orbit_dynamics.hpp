@@ -7,6 +7,7 @@
 #include <orrery/models/orbit/space_environment.hpp>
 #include <orrery/models/orbit/thrust.hpp>
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -40,6 +41,8 @@ class PropagationError : public std::runtime_error {
 class OrbitDynamics {
  public:
   using Forces = std::vector<std::shared_ptr<const ForceModel>>;
+  static constexpr std::size_t kMostForcesAlongOrbit = 4;
+  using Memories = std::array<ForceMemory, kMostForcesAlongOrbit>;
 
   /// What is known at a grid point: the elements, and what the next step and a look both need.
   struct State {
@@ -48,17 +51,33 @@ class OrbitDynamics {
     QuasiNonsingularElements rate;  // derivative of the elements [1/s]
     Vec3 a_ECI;                     // whole acceleration [m/s^2] from this instant on
     Vec3 a_before_ECI;              // and up to it: another one where a force jumps
+    Memories memories;              // of the ForceAlongOrbit, for the step that begins here
+  };
+
+  /// Where the orbit leaves the region of a ForceAlongOrbit.
+  struct Crossing {
+    SimTime t;
+    std::size_t force = 0;
   };
 
   /// @param attitude  What turns a body-fixed thrust; may be null if there is none.
-  /// @throws std::invalid_argument  null environment or null force.
+  /// @throws std::invalid_argument  null environment or null force; more than four ForceAlongOrbit.
   OrbitDynamics(std::shared_ptr<const SpaceEnvironment> environment, Forces forces,
                 std::shared_ptr<const AttitudeLaw> attitude = {});
 
   /// @throws std::invalid_argument  elements.hpp; also an orbit below the ground, mass <= 0.
+  /// @throws what a force throws where it is not defined.
   State start(const OrbitState& initial) const;
-  /// One RK4 step to `to`, any length. @throws PropagationError
+  /// One RK4 step to `to`, any length.
+  /// @throws PropagationError  no ellipse, below the ground, or a force refuses a place or instant.
   State step(const State& from, SimTime to) const;
+  /// Whether a force has edges that the orbit may meet.
+  bool has_edges() const { return has_edges_; }
+  /// The first edge of a force met in (a.t, b.t], where b = step(a, b.t): found on the step's
+  /// interpolant, to the nanosecond.
+  std::optional<Crossing> crossing(const State& a, const State& b) const;
+  /// The state at a crossing as the next step starts from it: position and velocity unchanged.
+  State beyond(const State& at, const Crossing& crossing) const;
   /// The velocity changed by dv_ECI at this instant.
   /// @throws std::domain_error  not finite. @throws PropagationError  no longer an ellipse.
   State after_impulse(const State& at, const Vec3& dv_ECI) const;
@@ -80,15 +99,26 @@ class OrbitDynamics {
   std::optional<SimTime> next_discontinuity(SimTime t) const;
 
  private:
-  struct Evaluation;
-  Evaluation evaluate(SimTime t, const QuasiNonsingularElements& x, double mass_kg,
-                      const Surroundings& around) const;
-  State completed(SimTime t, const QuasiNonsingularElements& x, double mass_kg,
-                  const Surroundings& around) const;
+  struct Point;
+  struct Force {
+    std::shared_ptr<const ForceModel> model;
+    const ForceAlongOrbit* along_orbit = nullptr;  // the same, if it is one
+    std::size_t slot = 0;                          // in memories
+  };
+  static Point point(SimTime t, const QuasiNonsingularElements& x, double mass_kg);
+  /// @throws PropagationError  with `from`, if x is no orbit above the ground.
+  static Point checked_point(SimTime t, const QuasiNonsingularElements& x, double mass_kg,
+                             const State& from);
+  Vec3 perturbation_ECI(const Point& at, const Surroundings& around,
+                        const Memories& memories) const;
+  State completed(const Point& at, const Surroundings& around, const Memories& memories) const;
   Vec3 thrust_acceleration_ECI(const OrbitState& orbit) const;
+  std::optional<SimTime> edge_of(const Force& force, const State& a, const State& b) const;
+  State stepped(const State& from, SimTime to) const;
 
   std::shared_ptr<const SpaceEnvironment> environment_;
-  Forces forces_;
+  std::vector<Force> forces_;
+  bool has_edges_ = false;
   std::shared_ptr<const AttitudeLaw> attitude_;
   Thrust thrust_;
 };

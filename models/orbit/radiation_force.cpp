@@ -73,8 +73,7 @@ Vec3 RadiationForce::acceleration_ECI(const OrbitState& state, const Surrounding
 
 double RadiationForce::margin(const OrbitState& state, const Surroundings& around,
                               const ForceMemory& memory) const {
-  const bool is_lit = region_of(memory) == Illumination::kSunlight;
-  if (options_.shadow == ShadowModel::kNone || (is_lit && is_on_day_side(state, around))) {
+  if (region_of(memory) == Illumination::kSunlight && is_on_day_side(state, around)) {
     return ForceAlongOrbit::margin(state, around, memory);
   }
   return margin_rad(shadow_geometry(state.r_ECI, around.r_sun_ECI), region_of(memory));

@@ -33,6 +33,7 @@ class RadiationForce final : public ForceAlongOrbit {
   ForceMemory begin(const OrbitState& state, const Surroundings& around) const override;
   Vec3 acceleration_ECI(const OrbitState& state, const Surroundings& around,
                         const ForceMemory& memory) const override;
+  bool has_edges() const override { return options_.shadow != ShadowModel::kNone; }
   double margin(const OrbitState& state, const Surroundings& around,
                 const ForceMemory& memory) const override;
   ForceMemory crossed(const ForceMemory& memory, const OrbitState& state,

@@ -23,9 +23,9 @@ struct SpacecraftOrbitOptions {
   std::shared_ptr<const AttitudeLaw> attitude = {};
 };
 
-/// A LazySystem of OrbitDynamics: its grid is fixed by `step`, by impulses and thrust edges, and by
-/// the discontinuities of the forces; any pattern of looks gives the same orbit, to the bit. Looks,
-/// impulses and edges come in the order of time.
+/// A LazySystem of OrbitDynamics: its grid is fixed by `step`, by impulses and thrust edges, by the
+/// discontinuities of the forces and by their edges in space; any pattern of looks gives the same
+/// orbit, to the bit. Looks, impulses and edges come in the order of time.
 class SpacecraftOrbit {
  public:
   /// @throws std::invalid_argument  an orbit below the ground or not an ellipse, mass <= 0, step <=
@@ -70,8 +70,8 @@ class SpacecraftOrbit {
     return to_quasi_nonsingular(inertial_state(at(t)));
   }
 
-  /// RK4 steps computed so far, those thrown away for an impulse included; looks between grid
-  /// points.
+  /// RK4 steps computed so far, those thrown away for an impulse or an edge included; looks between
+  /// grid points.
   std::uint64_t steps() const { return system_ ? system_->steps() : 0; }
   std::uint64_t interpolations() const { return system_ ? system_->interpolations() : 0; }
 
@@ -89,6 +89,14 @@ class SpacecraftOrbit {
     }
     std::optional<SimTime> next_discontinuity(SimTime t) const {
       return dynamics_.next_discontinuity(t);
+    }
+    bool has_edges() const { return dynamics_.has_edges(); }
+    std::optional<OrbitDynamics::Crossing> crossing(const State& a, SimTime, const State& b,
+                                                    SimTime) const {
+      return dynamics_.crossing(a, b);
+    }
+    State beyond(const State& at, const OrbitDynamics::Crossing& crossing) const {
+      return dynamics_.beyond(at, crossing);
     }
     const OrbitDynamics& dynamics() const { return dynamics_; }
     OrbitDynamics& dynamics() { return dynamics_; }

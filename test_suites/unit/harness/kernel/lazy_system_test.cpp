@@ -293,6 +293,107 @@ TEST_P(LazySystemLooksTest, WhatALookSeesDoesNotDependOnOtherLooks) {
 
 INSTANTIATE_TEST_SUITE_P(Seeds, LazySystemLooksTest, testing::Range<std::uint64_t>(1, 21));
 
+// A ball that is thrown up and bounces: at the floor, an edge of its state, the rate turns. The
+// flight between bounces is a parabola, so that the instants are known in closed form.
+struct Ball {
+  struct State {
+    double height_m = 2.0, rate_mps = 0.0;
+    int bounces = 0;
+    bool operator==(const State&) const = default;
+  };
+  struct Crossing {
+    SimTime t;
+  };
+  static constexpr double kGravity_mps2 = 10.0;
+  bool bounces = true;
+
+  State step(const State& x, SimTime from, SimTime to) const {
+    const double h = to_seconds(to - from);
+    return {x.height_m + h * x.rate_mps - kGravity_mps2 / 2 * h * h, x.rate_mps - kGravity_mps2 * h,
+            x.bounces};
+  }
+  State interpolate(const State& a, SimTime t_a, const State&, SimTime, SimTime t) const {
+    return step(a, t_a, t);
+  }
+  std::optional<SimTime> next_discontinuity(SimTime) const { return std::nullopt; }
+  bool has_edges() const { return bounces; }
+  std::optional<Crossing> crossing(const State& a, SimTime t_a, const State& b, SimTime t_b) const {
+    if (b.height_m > 0) return std::nullopt;
+    const double root_s =
+        (a.rate_mps + std::sqrt(a.rate_mps * a.rate_mps + 2 * kGravity_mps2 * a.height_m)) /
+        kGravity_mps2;
+    return Crossing{std::min(t_b, t_a + from_seconds(root_s) + 1ns)};
+  }
+  State beyond(const State& at, const Crossing&) const {
+    return {at.height_m, -at.rate_mps, at.bounces + 1};
+  }
+};
+
+struct LazySystemEdgesTest : testing::Test {
+  LazySystem<Ball> system = LazySystem<Ball>(Ball(), Ball::State(), kStart, 100ms);
+  // From 2 m: the floor is met after sqrt(0.4) s, and from then on every 2 sqrt(0.4) s. Each point
+  // is up to 1.5 ns late, which delays what follows by twice that: 4e-7 m at 6.3 m/s after 20
+  // bounces.
+  const double fall_s = std::sqrt(0.4);
+  double height_m(double t_s) const {
+    const double since_top_s = std::remainder(t_s, 2 * fall_s);
+    return 2 - 5 * since_top_s * since_top_s;
+  }
+};
+
+TEST_F(LazySystemEdgesTest, StepsEndWhereTheStateMeetsAnEdge) {
+  EXPECT_EQ(system.at(kStart + 600ms).bounces, 0);
+  EXPECT_EQ(system.at(kStart + 632ms).bounces, 0) << "before sqrt(0.4) s = 632.456 ms";
+  EXPECT_EQ(system.at(kStart + 633ms).bounces, 1);
+  EXPECT_EQ(system.committed_time(), kStart + from_seconds(fall_s) + 1ns);
+  EXPECT_EQ(system.at(kStart + 700ms).bounces, 1);
+  EXPECT_EQ(system.committed_time(), kStart + 700ms) << "on the old grid again";
+  EXPECT_EQ(system.steps(), 9u) << "7 to grid points, one of them in vain, one to the edge, one on";
+}
+
+TEST_F(LazySystemEdgesTest, EveryEdgeIsMetAndLooksDoNotMatter) {
+  LazySystem<Ball> seldom(Ball(), Ball::State(), kStart, 100ms);
+  for (int k = 1; k <= 25'000; ++k) {
+    const SimTime t = kStart + k * 1ms;
+    const Ball::State x = system.at(t);
+    ASSERT_NEAR(x.height_m, height_m(1e-3 * k), 4e-7) << k;
+    if (k % 4999 == 0) {
+      EXPECT_EQ(seldom.at(t), x) << k;
+    }
+  }
+  EXPECT_EQ(system.committed().bounces, 20);  // (25 / 0.632 + 1) / 2
+}
+
+// Something that happens after the edge but before the grid point must find the edge first; whether
+// a look had found it already must not matter.
+TEST_F(LazySystemEdgesTest, AnEdgeBeforeADiscontinuityComesFirst) {
+  LazySystem<Ball> looked(Ball(), Ball::State(), kStart, 100ms);
+  (void)looked.at(kStart + 640ms);
+  (void)system.at(kStart + 610ms);
+  const auto kick = [](Ball::State& x) { x.rate_mps += 1; };
+  looked.discontinuity(kStart + 650ms, kick);
+  system.discontinuity(kStart + 650ms, kick);
+  EXPECT_EQ(system.committed().bounces, 1);
+  EXPECT_EQ(system.committed(), looked.committed());
+  EXPECT_EQ(system.at(kStart + 3s), looked.at(kStart + 3s));
+}
+
+TEST_F(LazySystemEdgesTest, ADiscontinuityBeforeTheEdgeMovesIt) {
+  (void)system.at(kStart + 620ms);  // the bounce at 632 ms is in the point ahead
+  system.discontinuity(kStart + 620ms, [](Ball::State& x) { x.rate_mps = 5; });
+  EXPECT_EQ(system.at(kStart + 640ms).bounces, 0);
+}
+
+TEST(LazySystemErrorsTest, AnEdgeOutsideTheStepIsAnErrorNotAnEndlessLoop) {
+  struct Stuck : Ball {
+    std::optional<Crossing> crossing(const State&, SimTime t_a, const State&, SimTime) const {
+      return Crossing{t_a};
+    }
+  };
+  LazySystem<Stuck> system(Stuck(), Ball::State(), kStart, 1s);
+  EXPECT_THROW(system.at(kStart + 1s), std::logic_error);
+}
+
 // The two limits of a hybrid simulation.
 
 constexpr EventKind kCount = {1003, "count"};
