@@ -189,7 +189,7 @@ TEST(EarthForcesTest, EveryEdgeCostsTwoSteps) {
 // Three states: the force jumps at each edge. Were a stage to see the wrong side of one, a sixth of
 // a step of up to 10 s of half the force, 4e-8 m/s, would be missing and 4 h later have become
 // 3 * 4e-8 * 14400 = 2 mm along track. Steps of 10 s and of 2.5 s agree to 1/40 of that; observed
-// 5e-6 m.
+// 1.8e-5 m.
 TEST(EarthForcesTest, AForceThatJumpsAtAnEdgeIsDeliveredExactly) {
   const EarthForcesOptions jumps{.gravity_degree = 2,
                                  .drag = false,
