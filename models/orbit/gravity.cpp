@@ -1,47 +1,29 @@
 #include <orrery/models/orbit/gravity.hpp>
+#include <orrery/models/orbit/gravity_sums.hpp>
 
 #include <cmath>
-#include <cstring>
 #include <stdexcept>
+#include <string>
 
-// Notation, after Pines with normalised coefficients. With u = z/r, rho = R/r and
-//   A_nm(u) = d^m P_n/du^m, normalised, = s_nm p_nm(u), p_nm monic of degree n - m,
-// the potential is U = mu/r sum_n rho^n sum_m A_nm (C_nm r_m + S_nm i_m), r_m + i i_m = ((x +
-// iy)/r)^m. The recursion runs in b_nm = rho^(n-m) p_nm: b_mm = 1 and
-//   b_nm = (rho u) b_(n-1)m - gamma_nm rho^2 b_(n-2)m,  gamma_nm = ((n-1)^2 - m^2)/((2n-1)(2n-3)),
-// so powers of rho need no array of their own, and dA_nm/du = (n - m) s_nm p_n(m+1) turns
-// derivatives into values of the next order.
+// With u = z/r, rho = R/r, the normalised A_nm(u) = d^m P_n/du^m = s_nm p_nm(u), p_nm monic of
+// degree n - m, and (X + iY) = rho (x + iy)/r, the potential is
+//   U = mu/R rho sum_nm s_nm b_nm (C_nm Re + S_nm Im) (X + iY)^m,   b_nm = rho^(n-m) p_nm,
+// and the recursion, with k = n - m and Z = rho u, is b_0 = 1, b_1 = Z,
+//   b_k = Z b_(k-1) - gamma_k rho^2 b_(k-2),   gamma_k = (k-1)(2m+k-1) / ((2m+2k-1)(2m+2k-3)).
+// Odd b_k are Z times f_k, which saves products. Cunningham's rules for the gradient need, in monic
+// terms, the same factor 2n + 1 in all directions: with V + iW = rho b_(n+1) (X + iY)^m and
+// T_nm = (2n+1) s_nm C_nm, the order m receives
+//   R^2/mu (a_x, a_y, a_z): 1/2 V (T_n(m+1) - T_n(m-1)), -1/2 W (T_n(m+1) + T_n(m-1)), -V T_nm
+// from the C and in the same way from the S, where T_n0 counts twice in order 1.
 
 namespace orrery {
 namespace {
 
-// Two doubles: what every 64-bit processor has. Both compilers take wider vectors apart badly.
-using Pair = double __attribute__((vector_size(16)));
+using gravity_sums::kLanes;
 
-// Four orders. No lane ever meets another.
-struct Four {
-  Pair low{}, high{};
-
-  void operator+=(const Four& b) { low += b.low, high += b.high; }
-  friend Four operator*(const Four& a, const Four& b) { return {a.low * b.low, a.high * b.high}; }
-  friend Four operator*(double a, const Four& b) { return {a * b.low, a * b.high}; }
-  friend Four operator-(const Four& a, const Four& b) { return {a.low - b.low, a.high - b.high}; }
-  double operator[](int lane) const { return lane < 2 ? low[lane] : high[lane - 2]; }
-};
-
-Four load(const std::array<double, 4>& lanes) {
-  Four v;
-  std::memcpy(&v.low, &lanes[0], sizeof v.low);
-  std::memcpy(&v.high, &lanes[2], sizeof v.high);
-  return v;
-}
-
-constexpr std::array<std::array<double, 4>, 4> kUnit = {
-    {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
-
-// s_nm: leading coefficient of the normalised A_nm, row-major triangle. Long double, rounded once.
-std::vector<double> leading_coefficients(int degree) {
-  std::vector<double> s;
+// s_nm: leading coefficient of the normalised A_nm, row-major triangle.
+std::vector<long double> leading_coefficients(int degree) {
+  std::vector<long double> s;
   s.reserve(static_cast<std::size_t>((degree + 1) * (degree + 2) / 2));
   std::vector<long double> previous, current;
   long double sectoral = 1;
@@ -56,124 +38,206 @@ std::vector<double> leading_coefficients(int degree) {
     if (n == 1) sectoral = std::sqrt(3.0L);
     if (n > 1) sectoral *= std::sqrt(static_cast<long double>(2 * n + 1) / (2 * n));
     current[n] = sectoral;
-    for (const long double value : current) s.push_back(static_cast<double>(value));
+    s.insert(s.end(), current.begin(), current.end());
     previous.swap(current);
   }
   return s;
 }
 
-double recursion_factor(int n, int m) {
-  if (n < m + 2) return 0;
-  return (static_cast<double>(n - 1) * (n - 1) - static_cast<double>(m) * m) /
-         (static_cast<double>(2 * n - 1) * (2 * n - 3));
+double recursion_factor(int k, int m) {
+  return static_cast<double>(k - 1) * (2 * m + k - 1) /
+         (static_cast<double>(2 * m + 2 * k - 1) * (2 * m + 2 * k - 3));
+}
+
+// __builtin_cpu_supports asks the operating system, too.
+bool has(VectorPath path) {
+#if defined(ORRERY_GRAVITY_AVX)
+  if (path == VectorPath::kAvx2) return __builtin_cpu_supports("avx2") != 0;
+  if (path == VectorPath::kAvx512) return __builtin_cpu_supports("avx512f") != 0;
+#endif
+  return path == VectorPath::kPlain;
+}
+
+void sum(VectorPath path, const gravity_sums::Series& series, gravity_sums::Point& point) {
+#if defined(ORRERY_GRAVITY_AVX)
+  if (path == VectorPath::kAvx512) return gravity_sums::sum_avx512(series, point);
+  if (path == VectorPath::kAvx2) return gravity_sums::sum_avx2(series, point);
+#endif
+  (void)path;
+  gravity_sums::sum_plain(series, point);
+}
+
+// (X + iY)^m for the first eight orders: each from the one at half its order.
+void fill_powers(double X, double Y, gravity_sums::Point& point) {
+  double re[kLanes + 1] = {1, X}, im[kLanes + 1] = {0, Y};
+  for (int m = 2; m <= kLanes; ++m) {
+    const int a = m / 2, b = m - a;
+    re[m] = re[a] * re[b] - im[a] * im[b];
+    im[m] = re[a] * im[b] + im[a] * re[b];
+  }
+  for (int lane = 0; lane < kLanes; ++lane) {
+    point.re[lane] = re[lane];
+    point.im[lane] = im[lane];
+    point.a_x[lane] = point.a_y[lane] = point.a_z[lane] = 0;
+  }
+  point.step_re = re[kLanes];
+  point.step_im = im[kLanes];
+}
+
+gravity_sums::Point point_at(const Vec3& r_ECEF, double radius_m) {
+  const double q = radius_m / dot(r_ECEF, r_ECEF);  // R/r^2
+  gravity_sums::Point point;
+  point.z = q * r_ECEF.z;
+  point.rho2 = q * radius_m;
+  fill_powers(q * r_ECEF.x, q * r_ECEF.y, point);
+  return point;
+}
+
+double over_lanes(const double (&a)[kLanes]) {
+  return ((a[0] + a[4]) + (a[2] + a[6])) + ((a[1] + a[5]) + (a[3] + a[7]));
+}
+
+Vec3 gradient(const gravity_sums::Point& point, double mu_m3ps2, double radius_m) {
+  const double scale = mu_m3ps2 / (radius_m * radius_m) * std::sqrt(point.rho2);
+  return {0.5 * scale * over_lanes(point.a_x), 0.5 * scale * over_lanes(point.a_y),
+          scale * over_lanes(point.a_z)};
 }
 
 }  // namespace
 
-// Sums over the degree, per order. below: of order m - 1 over b of order m.
-struct HarmonicGravity::OrderSums {
-  Four C, S, nC, nS, C_below, S_below;
+struct HarmonicGravity::Coefficients {
+  std::vector<gravity_sums::RowPair> pairs;
+
+  Coefficients(const GravityField& field, int degree);
+  gravity_sums::Series series(int degree) const { return {degree, pairs.data()}; }
 };
 
-HarmonicGravity::HarmonicGravity(const GravityField& field, int degree)
-    : degree_(degree), mu_m3ps2_(field.mu_m3ps2()), radius_m_(field.radius_m()) {
+HarmonicGravity::Coefficients::Coefficients(const GravityField& field, int degree) {
+  const std::vector<long double> scale = leading_coefficients(degree);
+  const auto scaled = [&](double (GravityField::*coefficient)(int, int) const, int n, int m) {
+    if (m < 0 || m > n || n < 2 || n > degree) return 0.0;  // the central term is not in the sums
+    const auto index = static_cast<std::size_t>(n * (n + 1) / 2 + m);
+    return static_cast<double>((2 * n + 1) * scale[index] * (field.*coefficient)(n, m));
+  };
+  for (int block = 0; block < gravity_sums::block_count({degree, nullptr}); ++block) {
+    const int first = block * kLanes;
+    for (int pair = 0; pair < gravity_sums::pairs_from({degree, nullptr}, first); ++pair) {
+      gravity_sums::RowPair& row = pairs.emplace_back();
+      for (int odd = 0; odd < 2; ++odd) {
+        const int k = 2 * pair + odd;
+        for (int lane = 0; lane < kLanes; ++lane)
+          row.gamma[odd][lane] = recursion_factor(k + 2, first + lane);
+        for (int i = 0; i < kLanes + 2; ++i) {
+          const int m = first + i - 1;
+          row.C[odd][i] = scaled(&GravityField::C, m + k, m);
+          row.S[odd][i] = scaled(&GravityField::S, m + k, m);
+        }
+      }
+    }
+  }
+}
+
+std::string_view to_string(VectorPath path) {
+  switch (path) {
+    case VectorPath::kPlain:
+      return "plain";
+    case VectorPath::kAvx2:
+      return "avx2";
+    case VectorPath::kAvx512:
+      return "avx512";
+  }
+  return "unknown";
+}
+
+std::vector<VectorPath> HarmonicGravity::available_paths() {
+  std::vector<VectorPath> paths;
+  for (const VectorPath path : {VectorPath::kPlain, VectorPath::kAvx2, VectorPath::kAvx512}) {
+    if (has(path)) paths.push_back(path);
+  }
+  return paths;
+}
+
+HarmonicGravity::HarmonicGravity(const GravityField& field, int degree,
+                                 std::optional<VectorPath> path)
+    : degree_(degree),
+      mu_m3ps2_(field.mu_m3ps2()),
+      radius_m_(field.radius_m()),
+      path_(path.value_or(available_paths().back())) {
   if (degree < 2 || degree > field.degree()) {
     throw std::out_of_range("HarmonicGravity: degree = " + std::to_string(degree) +
                             "; accepted: 2 to " + std::to_string(field.degree()) + " (" +
                             field.name() + ")");
   }
-  const std::vector<double> scale = leading_coefficients(degree);
-  for (int block = 0; block * kLanes <= degree; ++block) {
-    block_start_.push_back(rows_.size());
-    for (int n = block * kLanes; n <= degree; ++n) {
-      rows_.emplace_back();
-      fill_row(field, scale, n, block, rows_.back());
-    }
+  if (!has(path_)) {
+    throw std::invalid_argument("HarmonicGravity: path = " + std::string(to_string(path_)) +
+                                "; this processor has none wider than " +
+                                std::string(to_string(available_paths().back())));
   }
+  coefficients_ = std::make_shared<const Coefficients>(field, degree);
 }
 
-void HarmonicGravity::fill_row(const GravityField& field, const std::vector<double>& scale, int n,
-                               int block, Row& row) const {
-  row = Row{};
-  for (int lane = 0; lane < kLanes; ++lane) {
-    const int m = block * kLanes + lane;
-    row.gamma[lane] = recursion_factor(n, m);
-    if (n < 2) continue;  // degree 0 is the central term, degree 1 is zero
-    const double* scale_n = &scale[static_cast<std::size_t>(n * (n + 1) / 2)];
-    if (m <= n) {
-      row.C[lane] = scale_n[m] * field.C(n, m);
-      row.S[lane] = scale_n[m] * field.S(n, m);
-    }
-    if (m >= 1 && m <= n) {
-      row.C_below[lane] = (n - m + 1) * scale_n[m - 1] * field.C(n, m - 1);
-      row.S_below[lane] = (n - m + 1) * scale_n[m - 1] * field.S(n, m - 1);
-    }
-  }
+Vec3 HarmonicGravity::sum_one(const Vec3& r_ECEF) const {
+  gravity_sums::Point point = point_at(r_ECEF, radius_m_);
+  sum(path_, coefficients_->series(degree_), point);
+  return gradient(point, mu_m3ps2_, radius_m_);
 }
 
-void HarmonicGravity::sum_order_block(int block, double z, double rho2, OrderSums* sums) const {
-  const int first = block * kLanes;
-  const Row* row = &rows_[block_start_[block]];
-  Four b, b1, b2;  // of degree n, n - 1, n - 2; zero below the order
-  OrderSums sum;
-  for (int n = first; n <= degree_; ++n, ++row) {
-    b = z * b1 - load(row->gamma) * (rho2 * b2);
-    if (n < first + kLanes) b += load(kUnit[n - first]);  // b_mm = 1
-    const Four C = load(row->C) * b, S = load(row->S) * b;
-    sum.C += C;
-    sum.S += S;
-    sum.nC += static_cast<double>(n) * C;
-    sum.nS += static_cast<double>(n) * S;
-    sum.C_below += load(row->C_below) * b;
-    sum.S_below += load(row->S_below) * b;
-    b2 = b1;
-    b1 = b;
+void HarmonicGravity::sum_two(const Vec3* r_ECEF, Vec3* a_ECEF) const {
+#if defined(ORRERY_GRAVITY_AVX)
+  if (path_ == VectorPath::kAvx512) {
+    gravity_sums::Point a = point_at(r_ECEF[0], radius_m_), b = point_at(r_ECEF[1], radius_m_);
+    gravity_sums::sum_two_avx512(coefficients_->series(degree_), a, b);
+    a_ECEF[0] = gradient(a, mu_m3ps2_, radius_m_);
+    a_ECEF[1] = gradient(b, mu_m3ps2_, radius_m_);
+    return;
   }
-  *sums = sum;
+#endif
+  // Sixteen registers hold the sums of one only.
+  const Vec3 first = sum_one(r_ECEF[0]), second = sum_one(r_ECEF[1]);
+  a_ECEF[0] = first;
+  a_ECEF[1] = second;
 }
 
 Vec3 HarmonicGravity::perturbation_ECEF(const Vec3& r_ECEF) const {
-  const double r = checked_radius(r_ECEF);
-  const double rho = radius_m_ / r;
-  const Vec3 direction = r_ECEF / r;
-  const double x = rho * direction.x, y = rho * direction.y;
-
-  double along_x = 0, along_y = 0, along_z = 0, radial = 0;  // Pines' a1 ... a4, without mu/r^2
-  double re = 1, im = 0;                                     // (x + iy)^m
-  double re_below = 0, im_below = 0;                         // (x + iy)^(m - 1)
-  OrderSums sums;
-  for (int m = 0; m <= degree_; ++m) {
-    const int lane = m % kLanes;
-    if (lane == 0) sum_order_block(m / kLanes, rho * direction.z, rho * rho, &sums);
-    const double X = sums.C[lane], Y = sums.S[lane];
-    along_x += m * (X * re_below + Y * im_below);
-    along_y += m * (Y * re_below - X * im_below);
-    along_z += sums.C_below[lane] * re_below + sums.S_below[lane] * im_below;
-    radial += (sums.nC[lane] + (m + 1) * X) * re + (sums.nS[lane] + (m + 1) * Y) * im;
-    re_below = re;
-    im_below = im;
-    re = x * re_below - y * im_below;
-    im = x * im_below + y * re_below;
-  }
-  radial += rho * along_z * direction.z;
-  const double scale = mu_m3ps2_ / (r * r);
-  return scale * (rho * Vec3{along_x, along_y, along_z} - radial * direction);
+  require_valid(r_ECEF);
+  return sum_one(r_ECEF);
 }
 
 Vec3 HarmonicGravity::acceleration_ECEF(const Vec3& r_ECEF) const {
-  const Vec3 perturbation = perturbation_ECEF(r_ECEF);
-  const double r2 = dot(r_ECEF, r_ECEF);
-  return perturbation - mu_m3ps2_ / (r2 * std::sqrt(r2)) * r_ECEF;
+  return perturbation_ECEF(r_ECEF) + central(r_ECEF);
 }
 
-double HarmonicGravity::checked_radius(const Vec3& r_ECEF) const {
+void HarmonicGravity::perturbations_ECEF(std::span<const Vec3> r_ECEF,
+                                         std::span<Vec3> a_ECEF) const {
+  if (r_ECEF.size() != a_ECEF.size()) {
+    throw std::invalid_argument("HarmonicGravity: " + std::to_string(r_ECEF.size()) +
+                                " positions but " + std::to_string(a_ECEF.size()) +
+                                " accelerations; accepted: as many");
+  }
+  for (const Vec3& r : r_ECEF) require_valid(r);
+  std::size_t i = 0;
+  for (; i + 1 < r_ECEF.size(); i += 2) sum_two(&r_ECEF[i], &a_ECEF[i]);
+  if (i < r_ECEF.size()) a_ECEF[i] = sum_one(r_ECEF[i]);
+}
+
+void HarmonicGravity::accelerations_ECEF(std::span<const Vec3> r_ECEF,
+                                         std::span<Vec3> a_ECEF) const {
+  perturbations_ECEF(r_ECEF, a_ECEF);
+  for (std::size_t i = 0; i < r_ECEF.size(); ++i) a_ECEF[i] += central(r_ECEF[i]);
+}
+
+Vec3 HarmonicGravity::central(const Vec3& r_ECEF) const {
+  const double r2 = dot(r_ECEF, r_ECEF);
+  return -(mu_m3ps2_ / (r2 * std::sqrt(r2))) * r_ECEF;
+}
+
+void HarmonicGravity::require_valid(const Vec3& r_ECEF) const {
   const double r = norm(r_ECEF);
   if (!(r >= radius_m_) || !std::isfinite(r)) {  // also catches NaN
     throw std::domain_error("HarmonicGravity: |r_ECEF| = " + std::to_string(r) +
                             " m; accepted: finite and at least the reference radius, " +
                             std::to_string(radius_m_) + " m");
   }
-  return r;
 }
 
 }  // namespace orrery

@@ -5,31 +5,42 @@
 #include <orrery/models/frames/vector.hpp>
 #include <orrery/models/orbit/gravity_field.hpp>
 
-#include <array>
-#include <string>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string_view>
 #include <vector>
 
 namespace orrery {
 
+/// How a sum is carried out: two, four or eight doubles at a time. All give the same bits.
+enum class VectorPath { kPlain, kAvx2, kAvx512 };
+std::string_view to_string(VectorPath path);
+
 /// Acceleration of a GravityField.
 ///
-/// Method      Pines, AIAA J. 11(11) 1973: the gradient in direction cosines, without a singularity
-/// at
-///             the poles. Per order m a recursion over the degree n in monic polynomials of z/r,
-///             all normalisation and derivative factors folded into the coefficients once, at
-///             construction. Four orders run side by side, each summed on its own, so vectors of
-///             any width give the same bits.
+/// Method      Cunningham, Celestial Mechanics 2 (1970): the gradient of the term (n, m) is made of
+///             the terms of degree n + 1 and orders m - 1, m, m + 1, without a singularity at the
+///             poles. Per order a recursion over the degree in monic polynomials of z/r; every
+///             normalisation and derivative factor is folded into the coefficients once, at
+///             construction, in long double.
+/// Bits        Eight orders run side by side, each summed on its own in one order, no fused
+///             multiply-add: one, two or eight lanes at a time, alone or in a batch, with any
+///             compiler or optimisation, give the same bits.
 /// Frames      ECEF in, ECEF out. Rotating to ECI is the caller's step (gravity_force.hpp).
 /// Valid for   |r| at or above the reference radius; inside it the series need not converge.
-/// Threads     Immutable after construction; calls keep everything on the stack.
+/// Threads     Immutable after construction; calls keep everything on the stack. Copies share the
+///             coefficients.
 /// Checked by  test_suites/unit/models/orbit/gravity_test.cpp and
 ///             test_suites/validation/models/orbit/gravity_test.cpp
 class HarmonicGravity {
  public:
   /// @param field   Coefficients, with the mu and radius they were estimated with.
   /// @param degree  Highest degree and order summed, 2 <= degree <= field.degree().
-  /// @throws std::out_of_range  `degree` outside that range.
-  HarmonicGravity(const GravityField& field, int degree);
+  /// @param path    For tests and benchmarks. Default: the widest that this processor has.
+  /// @throws std::out_of_range      `degree` outside that range.
+  /// @throws std::invalid_argument  this processor does not have `path`.
+  HarmonicGravity(const GravityField& field, int degree, std::optional<VectorPath> path = {});
 
   /// Acceleration [m/s^2] at `r_ECEF` [m], central term included. No allocation.
   /// @throws std::domain_error  |r_ECEF| below the reference radius, or not finite.
@@ -38,31 +49,33 @@ class HarmonicGravity {
   /// The same without the central term -mu r/|r|^3: the sum from degree 2, so nothing cancels.
   Vec3 perturbation_ECEF(const Vec3& r_ECEF) const;
 
+  /// The same at several positions, as for spacecraft that fly together: two at a time share the
+  /// coefficients. To the bit what the single calls give.
+  /// @throws std::invalid_argument  sizes differ. @throws std::domain_error  as above; nothing is
+  ///                                written then.
+  void accelerations_ECEF(std::span<const Vec3> r_ECEF, std::span<Vec3> a_ECEF) const;
+  void perturbations_ECEF(std::span<const Vec3> r_ECEF, std::span<Vec3> a_ECEF) const;
+
   int degree() const { return degree_; }
   double mu_m3ps2() const { return mu_m3ps2_; }
   double radius_m() const { return radius_m_; }
+  VectorPath path() const { return path_; }
 
-  static constexpr int kLanes = 4;  // orders side by side
+  /// Those of this processor, narrowest first.
+  static std::vector<VectorPath> available_paths();
 
  private:
-  using Lanes = std::array<double, kLanes>;
-  // What one degree n contributes to four orders.
-  struct alignas(32) Row {
-    Lanes gamma;             // recursion: b_n = z b_(n-1) - gamma b_(n-2)
-    Lanes C, S;              // for the sums over this order
-    Lanes C_below, S_below;  // order m - 1, for the derivative along z
-  };
-  struct OrderSums;
+  struct Coefficients;
 
-  void sum_order_block(int block, double z, double rho2, OrderSums* sums) const;
-  void fill_row(const GravityField& field, const std::vector<double>& scale, int n, int block,
-                Row& row) const;
-  double checked_radius(const Vec3& r_ECEF) const;
+  void require_valid(const Vec3& r_ECEF) const;
+  Vec3 central(const Vec3& r_ECEF) const;
+  Vec3 sum_one(const Vec3& r_ECEF) const;
+  void sum_two(const Vec3* r_ECEF, Vec3* a_ECEF) const;
 
   int degree_;
   double mu_m3ps2_, radius_m_;
-  std::vector<Row> rows_;                 // block after block, n from the block's first order
-  std::vector<std::size_t> block_start_;  // in rows_
+  VectorPath path_;
+  std::shared_ptr<const Coefficients> coefficients_;
 };
 
 }  // namespace orrery

@@ -19,9 +19,9 @@ Vec3 GravityForce::acceleration_ECI(const OrbitState& state, const Surroundings&
   return a_ECI - mu_difference / (r * r * r) * state.r_ECI;
 }
 
-std::shared_ptr<const GravityForce> make_earth_gravity(int degree) {
+std::shared_ptr<const GravityForce> make_earth_gravity(int degree, std::optional<VectorPath> path) {
   return std::make_shared<GravityForce>(
-      std::make_shared<HarmonicGravity>(GravityField::ggm05s(), degree));
+      std::make_shared<HarmonicGravity>(GravityField::ggm05s(), degree, path));
 }
 
 }  // namespace orrery

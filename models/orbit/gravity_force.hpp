@@ -25,7 +25,9 @@ class GravityForce final : public ForceModel {
   std::shared_ptr<const HarmonicGravity> gravity_;
 };
 
-/// GGM05S to `degree` (2 to 60), compiled in. @throws std::out_of_range  another degree.
-std::shared_ptr<const GravityForce> make_earth_gravity(int degree = 60);
+/// GGM05S to `degree` (2 to 60), compiled in. `path` as for HarmonicGravity.
+/// @throws std::out_of_range  another degree.
+std::shared_ptr<const GravityForce> make_earth_gravity(int degree = 60,
+                                                       std::optional<VectorPath> path = {});
 
 }  // namespace orrery
