@@ -106,20 +106,29 @@ SimTime EarthOrientationTable::last_observed() const {
   return last_observed_;
 }
 
-EarthOrientationParameters EarthOrientationTable::at(SimTime t) const {
-  if (is_none()) return {};
+// The row with row.t <= t < next row's, or the last but one.
+std::size_t EarthOrientationTable::row_before(SimTime t) const {
   if (t < first() || t > last())
     throw std::out_of_range("EarthOrientationTable::at: t = " + to_string(t) + " is outside " +
                             source_ + ", which covers " + to_string(first()) + " to " +
                             to_string(last()));
-
   const auto after =
-      std::upper_bound(rows_.begin(), rows_.end(), t,
+      std::upper_bound(rows_.begin(), rows_.end() - 1, t,
                        [](SimTime instant, const Row& row) { return instant < row.t; });
+  return static_cast<std::size_t>(after - rows_.begin()) - 1;
+}
+
+EarthOrientationTable::Span EarthOrientationTable::rows_around(SimTime t) const {
+  require_rows("rows_around");
+  const std::size_t i = row_before(t);
+  return {rows_[i].t, rows_[i + 1].t};
+}
+
+EarthOrientationParameters EarthOrientationTable::at(SimTime t) const {
+  if (is_none()) return {};
   // Two rows on either side of t, where the table has them.
-  const std::ptrdiff_t begin = std::clamp<std::ptrdiff_t>(
-      after - rows_.begin() - 2, 0, static_cast<std::ptrdiff_t>(rows_.size()) - kPoints);
-  const Row* const rows = &rows_[static_cast<std::size_t>(begin)];
+  const std::size_t before = std::max<std::size_t>(row_before(t), 1);
+  const Row* const rows = &rows_[std::min(before - 1, rows_.size() - kPoints)];
 
   std::array<double, kPoints> nodes;
   for (int i = 0; i < kPoints; ++i) nodes[i] = to_seconds(rows[i].t - rows[0].t) / kDay_s;

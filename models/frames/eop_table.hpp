@@ -55,6 +55,14 @@ class EarthOrientationTable {
   /// @throws std::out_of_range  `t` outside first() to last(); none() has no such limits.
   EarthOrientationParameters at(SimTime t) const;
 
+  /// Two rows next to one another with from <= t < to, or the last two: at() is smooth between
+  /// them.
+  struct Span {
+    SimTime from, to;
+  };
+  /// @throws as at(); std::logic_error  for none().
+  Span rows_around(SimTime t) const;
+
   bool is_none() const { return rows_.empty(); }
   /// 0h UTC of the first and last row; of the last observed one, first() if all are predicted.
   /// @throws std::logic_error  for none().
@@ -74,6 +82,7 @@ class EarthOrientationTable {
 
   void fill_length_of_day();
   void require_rows(const char* function) const;
+  std::size_t row_before(SimTime t) const;
 
   std::string source_;
   Offsets offsets_ = Offsets::kDpsiDeps;

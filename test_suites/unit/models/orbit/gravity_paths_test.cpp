@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -61,17 +62,18 @@ GravityField made_up_field(int degree) {
 }
 
 void expect_equal_bits(const GravityField& field, int degree, const std::vector<Vec3>& where) {
-  const HarmonicGravity plain(field, degree, VectorPath::kPlain);
-  for (const VectorPath path : HarmonicGravity::available_paths()) {
+  std::vector<Bits> expected;
+  for (const VectorPath path : HarmonicGravity::available_paths()) {  // plain comes first
     const HarmonicGravity gravity(field, degree, path);
     ASSERT_EQ(gravity.path(), path);
     std::vector<Vec3> together(where.size());
     gravity.perturbations_ECEF(where, together);
     int different = 0;
     for (std::size_t i = 0; i < where.size(); ++i) {
-      const Bits expected = bits(plain.perturbation_ECEF(where[i]));
-      different += bits(gravity.perturbation_ECEF(where[i])) != expected;
-      different += bits(together[i]) != expected;
+      const Bits alone = bits(gravity.perturbation_ECEF(where[i]));
+      if (path == VectorPath::kPlain) expected.push_back(alone);
+      different += alone != expected[i];
+      different += bits(together[i]) != expected[i];
       ASSERT_TRUE(is_finite(together[i]));
     }
     EXPECT_EQ(different, 0) << to_string(path) << ", degree " << degree;
@@ -80,17 +82,17 @@ void expect_equal_bits(const GravityField& field, int degree, const std::vector<
 
 TEST(GravityPathsTest, EveryPathGivesTheSameBitsAtEveryDegree) {
   const GravityField field = GravityField::ggm05s();
-  const std::vector<Vec3> where = positions(101);  // odd: the last one of a batch is alone
+  const std::vector<Vec3> where = positions(41);  // odd: the last one of a batch is alone
   for (int degree = 2; degree <= 60; ++degree) expect_equal_bits(field, degree, where);
 }
 
 TEST(GravityPathsTest, EveryPathGivesTheSameBitsAtManyPlaces) {
-  expect_equal_bits(GravityField::ggm05s(), 60, positions(5000));
+  expect_equal_bits(GravityField::ggm05s(), 60, positions(1501));
 }
 
 TEST(GravityPathsTest, EveryPathGivesTheSameBitsAtHighDegrees) {
   const GravityField field = made_up_field(360);
-  const std::vector<Vec3> where = positions(61);
+  const std::vector<Vec3> where = positions(21);
   for (const int degree : {61, 62, 63, 64, 65, 119, 200, 360})
     expect_equal_bits(field, degree, where);
 }
