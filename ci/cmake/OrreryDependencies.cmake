@@ -27,3 +27,10 @@ endmacro()
 macro(orrery_find_nettle)
   orrery_find_library(TARGET nettle::nettle HEADER nettle/sha2.h LIBRARY nettle PACKAGE nettle-dev)
 endmacro()
+
+# SUNDIALS has a CMake package. QUIET or REQUIRED.
+macro(orrery_find_sundials how)
+  if(NOT TARGET SUNDIALS::arkode)
+    find_package(SUNDIALS 6.4 ${how} COMPONENTS arkode nvecserial)
+  endif()
+endmacro()

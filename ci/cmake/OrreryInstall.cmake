@@ -13,6 +13,13 @@ install(TARGETS ${orrery_installed_targets} EXPORT orreryTargets
 install(TARGETS orrery_flight_abi EXPORT orreryTargets
   FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/orrery_flight_abi)
 install(EXPORT orreryTargets NAMESPACE orrery:: DESTINATION ${orrery_package_dir})
+if(TARGET orrery_reference)   # apart, so that the package is of use without SUNDIALS
+  add_dependencies(orrery_package orrery_reference)
+  install(TARGETS orrery_reference EXPORT orreryReferenceTargets
+    ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
+    FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+  install(EXPORT orreryReferenceTargets NAMESPACE orrery:: DESTINATION ${orrery_package_dir})
+endif()
 
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/orreryConfig.cmake.in
   ${PROJECT_BINARY_DIR}/orreryConfig.cmake INSTALL_DESTINATION ${orrery_package_dir}

@@ -8,8 +8,10 @@ endforeach()
 file(CREATE_LINK ${PROJECT_SOURCE_DIR}/fixtures/orrery.hpp ${ORRERY_INCLUDE_ROOT}/orrery/orrery.hpp
   SYMBOLIC)
 
-# orrery_library(name): the library orrery_<name> with the alias orrery::<name>.
+# orrery_library(name [EXPORT set]): the library orrery_<name> with the alias orrery::<name>. Installed
+# with orreryTargets, or with a set of its own where it needs what not every user has.
 function(orrery_library name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "EXPORT" "")
   add_library(orrery_${name} STATIC)
   add_library(orrery::${name} ALIAS orrery_${name})
   set_target_properties(orrery_${name} PROPERTIES EXPORT_NAME ${name} VERIFY_INTERFACE_HEADER_SETS ON)
@@ -22,7 +24,9 @@ function(orrery_library name)
     $<BUILD_INTERFACE:orrery_numerics> $<BUILD_INTERFACE:orrery_warnings>)
   # Whatever links code built with a sanitizer needs its runtime.
   target_link_options(orrery_${name} INTERFACE ${ORRERY_SANITIZE_LINK_OPTIONS})
-  set_property(GLOBAL APPEND PROPERTY ORRERY_INSTALLED_TARGETS orrery_${name})
+  if(NOT arg_EXPORT)
+    set_property(GLOBAL APPEND PROPERTY ORRERY_INSTALLED_TARGETS orrery_${name})
+  endif()
 endfunction()
 
 # orrery_room(library ROOM wing/room HEADERS ... SOURCES ...): adds a room to a library. Headers are
