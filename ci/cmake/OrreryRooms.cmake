@@ -74,6 +74,11 @@ function(orrery_suite name)
     set(arg_TIMEOUT 120)
   endif()
   target_compile_definitions(${name} PRIVATE ORRERY_REFERENCE_DATA="${ORRERY_REFERENCE_DATA}")
+  if("validation" IN_LIST arg_LABELS)
+    target_compile_definitions(${name} PRIVATE
+      ORRERY_MODELS_README="${PROJECT_SOURCE_DIR}/models/README.md")
+    set_property(GLOBAL APPEND PROPERTY ORRERY_VALIDATION_PROGRAMS ${name})
+  endif()
   orrery_discover_tests(${name} "${arg_LABELS}" ${arg_TIMEOUT})
 endfunction()
 

@@ -1,4 +1,5 @@
 #include <orrery/models/orbit/earth.hpp>
+#include <orrery/models/orbit/shadow.hpp>
 #include <orrery/models/reference/orbit_events.hpp>
 
 #include <algorithm>
@@ -8,19 +9,13 @@
 namespace orrery {
 namespace {
 
-constexpr double kRadiusSun_m = 6.957e8;  // nominal, IAU 2015 resolution B3
 constexpr double kHalfPi = 1.5707963267948966;
 
-/// Apparent radii of the Sun and the Earth and the distance of their centres, from the spacecraft.
-struct Discs {
-  double sun_rad, earth_rad, separation_rad;
-};
-
-Discs discs(const Vec3& r, const Vec3& r_sun) {
-  const Vec3 to_sun = r_sun - r;
-  const double d = norm(r);
-  return {std::asin(kRadiusSun_m / norm(to_sun)), std::asin(std::min(kRadiusEarth_m / d, 1.0)),
-          std::atan2(norm(cross(to_sun, -r)), dot(to_sun, -r))};
+const Vec3& position(const std::vector<OrbitState>& states, std::size_t spacecraft) {
+  if (spacecraft >= states.size())
+    throw std::out_of_range("EventFunction: spacecraft " + std::to_string(spacecraft) +
+                            "; accepted: below " + std::to_string(states.size()));
+  return states[spacecraft].r_ECI;
 }
 
 /// Shortest distance from the Earth's centre to the straight line between two points.
@@ -36,16 +31,16 @@ double distance_of_line(const Vec3& a, const Vec3& b) {
 EventFunction full_sunlight(std::size_t spacecraft) {
   return {"sunlight of " + std::to_string(spacecraft),
           [=](const std::vector<OrbitState>& states, const Surroundings& around) {
-            const Discs see = discs(states.at(spacecraft).r_ECI, around.r_sun_ECI);
-            return see.separation_rad - (see.earth_rad + see.sun_rad);
+            return margin_rad(shadow_geometry(position(states, spacecraft), around.r_sun_ECI),
+                              Illumination::kSunlight);
           }};
 }
 
 EventFunction umbra(std::size_t spacecraft) {
   return {"umbra of " + std::to_string(spacecraft),
           [=](const std::vector<OrbitState>& states, const Surroundings& around) {
-            const Discs see = discs(states.at(spacecraft).r_ECI, around.r_sun_ECI);
-            return see.earth_rad - see.sun_rad - see.separation_rad;
+            return margin_rad(shadow_geometry(position(states, spacecraft), around.r_sun_ECI),
+                              Illumination::kUmbra);
           }};
 }
 
@@ -55,7 +50,7 @@ EventFunction line_of_sight(std::size_t from, std::size_t to, double grazing_hei
                                 std::to_string(grazing_height_m) + " m; accepted: 0 or more");
   return {"sight from " + std::to_string(from) + " to " + std::to_string(to),
           [=](const std::vector<OrbitState>& states, const Surroundings&) {
-            return distance_of_line(states.at(from).r_ECI, states.at(to).r_ECI) -
+            return distance_of_line(position(states, from), position(states, to)) -
                    (kRadiusEarth_m + grazing_height_m);
           }};
 }
@@ -71,7 +66,7 @@ EventFunction pass(std::size_t spacecraft, std::string station, const Geodetic& 
                      std::sin(place.latitude_rad)};
   return {"pass of " + std::to_string(spacecraft) + " over " + std::move(station),
           [=](const std::vector<OrbitState>& states, const Surroundings& around) {
-            const Vec3 line = around.R_EI * states.at(spacecraft).r_ECI - r_station_ECEF;
+            const Vec3 line = around.R_EI * position(states, spacecraft) - r_station_ECEF;
             return std::asin(std::clamp(dot(unit(line), up_ECEF), -1.0, 1.0)) - mask_rad;
           }};
 }

@@ -23,7 +23,8 @@ struct OrbitEvent {
 };
 
 // The ready ones. Numbers say which spacecraft of the propagator's list. Each begins and ends what
-// its name says. @throws std::invalid_argument  a range that is not met, at once.
+// its name says. @throws std::invalid_argument  a range that is not met, at once;
+// std::out_of_range, when asked: no such spacecraft.
 
 /// "sunlight of 0": no part of the Sun's disc is covered by the Earth, a sphere without an
 /// atmosphere. Ends with the entry into the penumbra, begins with the exit.

@@ -55,7 +55,7 @@ class ReferencePropagator::Solver {
                                     to_string(spacecraft.front().initial.t) + ", another at " +
                                     to_string(s.initial.t));
       states_.push_back(s.initial);
-      forces_.push_back(std::move(s.forces));
+      laws_.push_back({std::move(s.forces), std::move(s.attitude), {}});
     }
     create();
   }
@@ -89,10 +89,37 @@ class ReferencePropagator::Solver {
     states_[spacecraft].v_ECI += dv_ECI;
   }
 
+  void set_thrust(std::size_t spacecraft, const Thrust& thrust) {
+    require_spacecraft("set_thrust", spacecraft);
+    Law& law = laws_[spacecraft];
+    OrbitDynamics(environment_, law.forces, law.attitude).check_thrust(thrust);
+    law.thrust = thrust;
+  }
+
   std::uint64_t steps() const { return steps_; }
   std::uint64_t evaluations() const { return evaluations_; }
 
  private:
+  /// What moves one spacecraft.
+  struct Law {
+    OrbitDynamics::Forces forces;
+    std::shared_ptr<const AttitudeLaw> attitude;
+    Thrust thrust;
+
+    Vec3 acceleration(const OrbitState& state, const Surroundings& around) const {
+      Vec3 force_ECI = thrust.force_ECI;
+      if (thrust.force_B != Vec3{})
+        force_ECI += transpose(attitude->R_BI(state.t, inertial_state(state))) * thrust.force_B;
+      return acceleration_ECI(forces, state, around) + force_ECI / state.mass_kg;
+    }
+    std::optional<SimTime> next_jump(SimTime t) const {
+      const std::optional<SimTime> jump = next_discontinuity(forces, t);
+      if (thrust.force_B == Vec3{}) return jump;
+      const std::optional<SimTime> turn = attitude->next_discontinuity(t);
+      return jump && turn ? std::min(*jump, *turn) : jump ? jump : turn;
+    }
+  };
+
   void require_spacecraft(const char* function, std::size_t i) const {
     if (i >= states_.size())
       throw std::out_of_range("ReferencePropagator::" + std::string(function) + ": spacecraft " +
@@ -133,9 +160,8 @@ class ReferencePropagator::Solver {
   std::vector<SimTime> segment_ends(SimTime t) const {
     const SimTime first = std::min(time(), t), last = std::max(time(), t);
     std::vector<SimTime> ends;
-    for (const OrbitDynamics::Forces& forces : forces_)
-      for (auto jump = next_discontinuity(forces, first); jump && *jump < last;
-           jump = next_discontinuity(forces, *jump))
+    for (const Law& law : laws_)
+      for (auto jump = law.next_jump(first); jump && *jump < last; jump = law.next_jump(*jump))
         ends.push_back(*jump);
     std::sort(ends.begin(), ends.end());
     if (t < time()) std::reverse(ends.begin(), ends.end());
@@ -205,16 +231,16 @@ class ReferencePropagator::Solver {
     }
   }
 
-  void read_states(SimTime t) { states_ = states_from(y_, t); }
+  void read_states(SimTime t) { states_ = states_from(y_, t, to_seconds(t - begin_)); }
 
-  std::vector<OrbitState> states_from(N_Vector numbers, SimTime t) const {
+  /// `since_s` from the begin of the segment on, for the masses; negative backwards.
+  std::vector<OrbitState> states_from(N_Vector numbers, SimTime t, double since_s) const {
     const double* y = N_VGetArrayPointer(numbers);
     std::vector<OrbitState> states = states_;
-    for (OrbitState& s : states) {
-      s.t = t;
-      s.r_ECI = vector_at(y);
-      s.v_ECI = vector_at(y + 3);
-      y += kNumbersEach;
+    for (std::size_t i = 0; i < states.size(); ++i, y += kNumbersEach) {
+      OrbitState& s = states[i];
+      s = {t, vector_at(y), vector_at(y + 3), s.mass_kg - laws_[i].thrust.mass_flow_kgps * since_s};
+      if (!(s.mass_kg > 0)) throw PropagationError("a thrust used up all mass", states_[i]);
     }
     return states;
   }
@@ -250,12 +276,12 @@ class ReferencePropagator::Solver {
   void put_derivative(double t_s, N_Vector y, double* rate) const {
     const SimTime t = instant_for_forces(t_s);
     const Surroundings around = environment_->surroundings(t);
-    const std::vector<OrbitState> states = states_from(y, t);
+    const std::vector<OrbitState> states = states_from(y, t, direction() * t_s);
     for (std::size_t i = 0; i < states.size(); ++i, rate += kNumbersEach) {
       if (!(norm(states[i].r_ECI) >= kRadiusEarth_m))
         throw PropagationError("the orbit went below the ground", states_[i]);
       put(rate, direction() * states[i].v_ECI);
-      put(rate + 3, direction() * acceleration_ECI(forces_[i], states[i], around));
+      put(rate + 3, direction() * laws_[i].acceleration(states[i], around));
     }
   }
 
@@ -263,7 +289,7 @@ class ReferencePropagator::Solver {
     auto& solver = *static_cast<Solver*>(self);
     return solver.guarded([&] {
       const SimTime t = solver.instant(t_s);
-      const std::vector<OrbitState> states = solver.states_from(y, t);
+      const std::vector<OrbitState> states = solver.states_from(y, t, solver.direction() * t_s);
       const Surroundings around = solver.environment_->surroundings(t);
       for (const EventFunction& f : *solver.functions_) *values++ = f.value(states, around);
     });
@@ -287,7 +313,7 @@ class ReferencePropagator::Solver {
   std::shared_ptr<const SpaceEnvironment> environment_;
   ReferenceOptions options_;
   std::vector<OrbitState> states_;  // at the begin of the segment, or where it stopped
-  std::vector<OrbitDynamics::Forces> forces_;
+  std::vector<Law> laws_;
   const std::vector<EventFunction>* functions_ = nullptr;  // of the advance_to that runs
   SimTime begin_, end_;                                    // of the segment that runs
   SUNContext context_ = nullptr;
@@ -324,6 +350,10 @@ std::vector<OrbitEvent> ReferencePropagator::advance_to(
 
 void ReferencePropagator::apply_impulse(std::size_t spacecraft, const Vec3& dv_ECI) {
   solver_->apply_impulse(spacecraft, dv_ECI);
+}
+
+void ReferencePropagator::set_thrust(std::size_t spacecraft, const Thrust& thrust) {
+  solver_->set_thrust(spacecraft, thrust);
 }
 
 std::uint64_t ReferencePropagator::steps() const {

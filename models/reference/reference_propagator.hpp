@@ -14,14 +14,15 @@ namespace orrery {
 struct ReferenceSpacecraft {
   OrbitState initial;
   OrbitDynamics::Forces forces = {};  // besides the point mass, as SpacecraftOrbitOptions::forces
+  std::shared_ptr<const AttitudeLaw> attitude = {};  // turns body-fixed thrust
 };
 
 struct ReferenceOptions {
   /// Local error per step as it is estimated, relative to |r| and |v|. 1e-15 to 1e-3; 1e-13 is a
   /// micrometre a step.
   double tolerance = 1e-13;
-  /// Above 0. The shortest waves of a 60x60 field pass in 90 s, and the estimate is blind to part of
-  /// them: with steps up to 60 s a day errs by 0.1 mm whatever the tolerance, with 30 s by 1 um.
+  /// Above 0. The shortest waves of a 60x60 field pass in 90 s, and the estimate is blind to part
+  /// of them: with steps up to 60 s a day errs by 0.1 mm whatever the tolerance, with 30 s by 1 um.
   /// Events shorter than a step may be missed.
   Duration longest_step = 30s;
   /// Steps of this length instead, without error control: to measure the order of convergence.
@@ -36,7 +37,8 @@ struct ReferenceOptions {
 ///            step for one that reuses it, and loses an order.
 /// Forces     The same ForceModel list as the truth's propagator, the force itself without memory
 ///            (ForceAlongOrbit). The integration stops where a force jumps and begins anew; so it
-///            does after an impulse.
+///            does after an impulse and at a thrust edge. The step control sees to the kinks at the
+///            edges of the shadow.
 /// Frames     ECI; the point mass by kMuEarth_m3ps2.
 /// Errors     24 h at 550 km in a 60x60 field: 10 um (integrators_test.cpp).
 /// Not for    Truth: an adaptive step depends on where the caller stops, so that a further look
@@ -66,6 +68,9 @@ class ReferencePropagator {
 
   /// Changes a velocity by dv_ECI [m/s] at time(). @throws std::out_of_range, std::domain_error.
   void apply_impulse(std::size_t spacecraft, const Vec3& dv_ECI);
+  /// The thrust on the path from time() on, whichever way it leads; Thrust{} ends it. The mass
+  /// falls with time. @throws std::out_of_range, and as OrbitDynamics::set_thrust.
+  void set_thrust(std::size_t spacecraft, const Thrust& thrust);
 
   /// Steps and evaluations of all forces so far.
   std::uint64_t steps() const;
