@@ -5,7 +5,7 @@
 
 #include "constants.hpp"
 #include "orrery_messages.h"
-#include "support/crc32.hpp"
+#include "support/crc32.h"
 
 namespace formation_keeping {
 namespace {
@@ -63,7 +63,7 @@ BestxyzParser::Event BestxyzParser::push(unsigned char byte) {
   }
   if (count_ < kFrameBytes) return Event::kNothing;
   const std::uint32_t expected = orrery_get_u32(held_ + kFrameBytes - 4);
-  if (flight_support::crc32_novatel(held_, kFrameBytes - 4) != expected) {
+  if (flight_crc32_novatel(held_, kFrameBytes - 4) != expected) {
     drop_first_and_resynchronise();
     return Event::kBadFrame;
   }

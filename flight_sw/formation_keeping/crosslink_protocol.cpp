@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "orrery_messages.h"
-#include "support/crc32.hpp"
+#include "support/crc32.h"
 
 namespace formation_keeping {
 namespace {
@@ -14,7 +14,7 @@ constexpr std::uint32_t kWindow = 64;
 
 bool is_sound(const unsigned char* message, std::uint32_t bytes, Role peer) {
   if (bytes != kCrosslinkBytes) return false;
-  if (orrery_get_u32(message + kCrcAt) != flight_support::crc32_common(message, kCrcAt))
+  if (orrery_get_u32(message + kCrcAt) != flight_crc32_common(message, kCrcAt))
     return false;
   for (int k = 0; k < 3; ++k) {
     if (message[k] != kMagicAndVersion[k]) return false;
@@ -48,7 +48,7 @@ void CrosslinkSender::pack(const GnssFix& fix, unsigned char (&message)[kCrossli
   }
   orrery_put_f64(message + 68, fix.sigma_r_m);
   orrery_put_f64(message + 76, fix.sigma_v_mps);
-  orrery_put_u32(message + kCrcAt, flight_support::crc32_common(message, kCrcAt));
+  orrery_put_u32(message + kCrcAt, flight_crc32_common(message, kCrcAt));
   ++next_sequence_;
 }
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "support/crc32.hpp"
+#include "support/crc32.h"
 
 namespace flight_support {
 namespace {
@@ -37,8 +37,8 @@ TEST(MatrixTest, CrossAndTransposeFollowTheirDefinition) {
 // zero.
 TEST(Crc32Test, GivesTheCheckValues) {
   const unsigned char digits[] = "123456789";
-  EXPECT_EQ(crc32_novatel(digits, 9), 0x2DFD2D88u);
-  EXPECT_EQ(crc32_common(digits, 9), 0xCBF43926u);
+  EXPECT_EQ(flight_crc32_novatel(digits, 9), 0x2DFD2D88u);
+  EXPECT_EQ(flight_crc32_common(digits, 9), 0xCBF43926u);
 }
 
 }  // namespace
