@@ -123,7 +123,7 @@ constexpr std::array<YumaField, 10> kYumaFields{{{"eccentricity", kEccentricity}
                                                  {"af0", kAf0},
                                                  {"af1", kAf1}}};
 
-GpsAlmanacEntry yuma_record(NumberedLines& lines) {
+GpsAlmanacEntry yuma_record(NumberedLines& lines, std::string_view title) {
   GpsAlmanacEntry entry;
   const auto next = [&lines](const char* label) {
     const auto line = lines.next();
@@ -138,7 +138,11 @@ GpsAlmanacEntry yuma_record(NumberedLines& lines) {
   entry.health = health_in(lines, next("health"));
   for (const YumaField& field : kYumaFields) set(lines, field.field, next(field.label), entry);
   entry.week = week_in(lines, next("week"));
-  if (!lines.line_had_end()) lines.fail("cut short: the last line has no line end");
+  // Published files end without a line end: then the title must say the same week.
+  if (!lines.line_had_end() &&
+      title.find(" " + std::to_string(entry.week) + " ") == std::string_view::npos) {
+    lines.fail("cut short: the last line has no line end and its week is not the title's");
+  }
   return entry;
 }
 
@@ -221,7 +225,7 @@ GpsAlmanac parse_yuma(std::string_view text, std::string_view source_name) {
   while (const auto line = lines.next()) {
     if (trimmed(*line).empty()) continue;
     if (!line->starts_with("****")) lines.fail(quoted(*line) + "; expected a line of asterisks");
-    append(lines, yuma_record(lines), almanac);
+    append(lines, yuma_record(lines, *line), almanac);
   }
   return complete(lines, std::move(almanac));
 }

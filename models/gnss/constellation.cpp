@@ -110,11 +110,15 @@ void move(SatelliteState& s, const Vec3& d_RTN) {
   const Vec3 h = cross(s.r_ECEF, s.v_ECEF + cross(omega_E, s.r_ECEF));
   const Vec3 R = unit(s.r_ECEF), N = unit(h), T = cross(N, R);
   const Vec3 d = d_RTN.x * R + d_RTN.y * T + d_RTN.z * N;
-  const Vec3 omega = h / dot(s.r_ECEF, s.r_ECEF) - omega_E;
+  const double r2 = dot(s.r_ECEF, s.r_ECEF);
+  const Vec3 omega_orbit = h / r2, omega = omega_orbit - omega_E;
+  // In ECEF the plane of the orbit turns back with the Earth; h/r^2 changes with r.
+  const Vec3 omega_rate =
+      cross(omega_orbit, omega_E) - 2 * dot(s.r_ECEF, s.v_ECEF) / r2 * omega_orbit;
   const Vec3 d_rate = cross(omega, d);
   s.r_ECEF += d;
   s.v_ECEF += d_rate;
-  s.a_ECEF += cross(omega, d_rate);
+  s.a_ECEF += cross(omega, d_rate) + cross(omega_rate, d);
 }
 
 /// From a to b as w goes from 0 to 1 in `span_s`: 6w^5 - 15w^4 + 10w^3.

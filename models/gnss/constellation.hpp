@@ -53,7 +53,7 @@ struct GpsSnapshot {
 ///             up modulo 1024. From a file: its own; the truth passes from one to the next with a
 ///             quintic smooth step between their toes, so that phases stay continuous.
 /// Orbits      Quintic Hermite between knots every 120 s on a fixed grid; the result depends on t
-///             alone. Against the user algorithm: 1e-7 m. Guard: a midpoint of each interval is
+///             alone. Against the user algorithm: 1e-6 m. Guard: a midpoint of each interval is
 ///             checked, and an error above 0.1 mm is std::logic_error.
 /// Threads     Not safe: the knots and the last snapshot are kept. Two objects give equal bits.
 /// Checked by  test_suites/unit/models/gnss/constellation_test.cpp

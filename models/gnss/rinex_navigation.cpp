@@ -1,10 +1,10 @@
 #include <orrery/models/frames/eop_text.hpp>
 #include <orrery/models/gnss/gps_constants.hpp>
-#include <orrery/models/gnss/lnav.hpp>
 #include <orrery/models/gnss/rinex_navigation.hpp>
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace orrery {
 namespace {
@@ -220,10 +220,13 @@ class NavigationReader {
     e.fit_interval_above_4h = fit_h > 4;
   }
 
+  /// IS-GPS-200, 20.3.3.3.1.3: an index holds up to its limit. Files give limits or nominal values.
   static int ura_index(double accuracy_m) {
-    int index = 0;
-    while (index < 15 && accuracy_m > lnav::ura_m(index) * (1 + 1e-9)) ++index;
-    return index;
+    constexpr double kLimits_m[] = {2.4, 3.4, 4.85, 6.85, 9.65, 13.65, 24,  48,
+                                    96,  192, 384,  768,  1536, 3072,  6144};
+    const auto* end = std::end(kLimits_m);
+    return static_cast<int>(std::lower_bound(std::begin(kLimits_m), end, accuracy_m) -
+                            std::begin(kLimits_m));
   }
 
   NumberedLines lines_;

@@ -118,9 +118,9 @@ TEST(GpsAlmanacTest, CarriedAlmanacIsTheRealConstellation) {
   for (const GpsAlmanacEntry& entry : almanac) {
     EXPECT_NE(entry.prn, 4);
     EXPECT_EQ(entry.week, 866);
-    // GPS: 26 560 km within 50 km, 53 to 57 degrees.
+    // GPS: 26 560 km within 50 km; launched to 55 degrees, 51 to 57 after years.
     EXPECT_NEAR(entry.sqrt_a_sqrtm * entry.sqrt_a_sqrtm, 26.56e6, 5e4) << entry.prn;
-    EXPECT_NEAR(entry.inclination_rad, 55 * kPi / 180, 2 * kPi / 180) << entry.prn;
+    EXPECT_NEAR(entry.inclination_rad, 55 * kPi / 180, 4 * kPi / 180) << entry.prn;
   }
 }
 
@@ -154,7 +154,9 @@ TEST(GpsAlmanacTest, DefectsOfYumaAreNamedWithTheirLine) {
                     AllOf(HasSubstr("GpsAlmanac: a.alm"), HasSubstr(d.said))));
   }
   const std::string whole = yuma();
-  EXPECT_THROW(parse_yuma(whole.substr(0, whole.size() - 1), "a.alm"), std::invalid_argument);
+  // The line end alone may be missing, as in published files; a digit may not.
+  EXPECT_EQ(parse_yuma(whole.substr(0, whole.size() - 1), "a.alm"), parse_yuma(whole, "a.alm"));
+  EXPECT_THROW(parse_yuma(whole.substr(0, whole.size() - 2), "a.alm"), std::invalid_argument);
   EXPECT_THROW(parse_yuma("", "a.alm"), std::invalid_argument);
 }
 

@@ -100,7 +100,7 @@ TEST(RinexNavigationTest, DefectsAreNamedWithTheirLine) {
   for (const Defect& d : {
            Defect{"RINEX VERSION", "RYNEX VERSION", "line 1: the first line is not a RINEX"},
            Defect{"     2     ", "     4     ", "line 1: version '     4   '; accepted: 2 and 3"},
-           Defect{"NAVIGATION", "OBSERVATION", "line 1: file type 'O'"},
+           Defect{"NAVIGATION", "OBSERVATIO", "line 1: file type 'O'"},
            Defect{"END OF HEADER", "END OF HEAD", "cut short: no END OF HEADER"},
            Defect{" 2 10  7", "40 10  7", "line 6: PRN is '40'"},
            Defect{" 2 10  7", " 2 10 13", "line 6: month is '13'"},
