@@ -208,6 +208,8 @@ void GpsConstellation::add_from_file(const std::vector<BroadcastEphemeris>& ephe
       return time_of_ephemeris(a) == time_of_ephemeris(b);
     };
     v.issues.erase(std::unique(v.issues.begin(), v.issues.end(), same_toe), v.issues.end());
+    if (v.issues.empty()) continue;
+    group_delays_s_[static_cast<std::size_t>(v.issues.front().prn - 1)] = v.issues.front().tgd_s;
   }
 }
 

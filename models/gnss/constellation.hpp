@@ -73,6 +73,9 @@ class GpsConstellation {
   /// nothing. Valid until the next call for that satellite.
   const BroadcastEphemeris* broadcast(int prn, SimTime t);
 
+  /// TGD: the codes of L1 leave later by this than the clock says, those of L2 by (f1/f2)^2 of it.
+  double group_delay_s(int prn) const { return group_delays_s_[static_cast<std::size_t>(prn - 1)]; }
+
   /// The satellite transmits nothing in [from, until).
   void add_outage(int prn, SimTime from, SimTime until);
   /// Its broadcast says `health` (6 bits, 0: good) in issues that begin in [from, until).
@@ -120,6 +123,7 @@ class GpsConstellation {
   bool interpolate_;
   std::array<Vehicle, gps::kSatellites> vehicles_;
   std::uint32_t satellites_ = 0;
+  std::array<double, gps::kSatellites> group_delays_s_{};  // of the file's first issue
   std::vector<Window> outages_, healths_;
 
   std::int64_t interval_ = INT64_MIN;
