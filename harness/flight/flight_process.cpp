@@ -26,9 +26,9 @@ void check_name(const char* what, const std::string& name) {
 }
 
 void check_heap_limit(const char* function, std::uint64_t bytes) {
-  if (bytes > FirstFitHeap::kMaxLimit_bytes) {
+  if (bytes > BlockHeap::kMaxLimit_bytes) {
     throw std::invalid_argument(std::string(function) + ": heap limit = " + std::to_string(bytes) +
-                                " bytes is above " + std::to_string(FirstFitHeap::kMaxLimit_bytes));
+                                " bytes is above " + std::to_string(BlockHeap::kMaxLimit_bytes));
   }
 }
 
@@ -41,7 +41,7 @@ void check_heap(const FlightProcessOptions& options) {
   check_heap_limit("FlightProcess", options.heap_bytes);
 }
 
-FirstFitOptions heap_options(const FlightProcessOptions& options) {
+HeapOptions heap_options(const FlightProcessOptions& options) {
   return {.alignment = options.heap_alignment, .limit_bytes = options.heap_bytes};
 }
 
@@ -198,7 +198,7 @@ void FlightProcess::Impl::begin_call() {
 void FlightProcess::Impl::end_call(SimTime truth) {
   record = CallRecord{.t = truth};
   if (heap != nullptr) {
-    const FirstFitHeap& blocks = heap->blocks();
+    const BlockHeap& blocks = heap->blocks();
     record.resting_bytes = blocks.live_bytes();
     record.transient_peak_bytes = blocks.peak_since_mark_bytes();
     record.heap_bytes = blocks.heap_bytes();

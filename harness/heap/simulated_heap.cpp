@@ -9,8 +9,8 @@ namespace {
 // By slot. Plain pointers: a heap belongs to the one thread that runs its process.
 constinit std::array<SimulatedHeap*, Arena::kSlots> heap_of_slot{};
 
-void* open_arena(Arena& arena, std::uint64_t limit_bytes) {
-  arena.open(limit_bytes + FirstFitHeap::kOverhead_bytes);
+void* open_arena(Arena& arena, const HeapOptions& options) {
+  arena.open(BlockHeap::arena_bytes(options));
   return arena.base();
 }
 
@@ -18,9 +18,8 @@ void* open_arena(Arena& arena, std::uint64_t limit_bytes) {
 
 thread_local constinit SimulatedHeap* current_heap = nullptr;
 
-SimulatedHeap::SimulatedHeap(const FirstFitOptions& options)
-    : blocks_(open_arena(arena_, std::min(options.limit_bytes, FirstFitHeap::kMaxLimit_bytes)),
-              options) {
+SimulatedHeap::SimulatedHeap(const HeapOptions& options)
+    : blocks_(make_heap(open_arena(arena_, options), options)) {
   heap_of_slot[arena_.slot()] = this;
 }
 
@@ -29,13 +28,12 @@ SimulatedHeap::~SimulatedHeap() {
 }
 
 void SimulatedHeap::set_limit(std::uint64_t bytes) {
-  blocks_.set_limit(bytes);
-  arena_.open(bytes + FirstFitHeap::kOverhead_bytes);
+  blocks_->set_limit(bytes);
+  arena_.open(BlockHeap::arena_bytes(blocks_->options()));
 }
 
 void SimulatedHeap::drop() {
   heap_of_slot[arena_.slot()] = nullptr;
-  blocks_.largest_free_bytes();  // while the list can still be read
   arena_.reset();
 }
 

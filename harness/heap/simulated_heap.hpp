@@ -2,22 +2,22 @@
 #pragma once
 
 #include <orrery/harness/heap/arena.hpp>
-#include <orrery/harness/heap/first_fit_heap.hpp>
+#include <orrery/harness/heap/block_heap.hpp>
 
 namespace orrery {
 
-/// A first-fit heap in an arena of its own. Blocks are found by address, so what is allocated here
+/// A heap in an arena of its own. Blocks are found by address, so what is allocated here
 /// may be freed while another heap is current, or none.
 class SimulatedHeap {
  public:
   /// @throws std::invalid_argument  options outside their ranges; std::runtime_error  as Arena.
-  explicit SimulatedHeap(const FirstFitOptions& options);
+  explicit SimulatedHeap(const HeapOptions& options);
   ~SimulatedHeap();
   SimulatedHeap(const SimulatedHeap&) = delete;
   SimulatedHeap& operator=(const SimulatedHeap&) = delete;
 
-  FirstFitHeap& blocks() { return blocks_; }
-  const FirstFitHeap& blocks() const { return blocks_; }
+  BlockHeap& blocks() { return *blocks_; }
+  const BlockHeap& blocks() const { return *blocks_; }
   void set_limit(std::uint64_t bytes);
   /// The process is dead: its memory goes back to the system, figures stay. Blocks that are freed
   /// from here on are ignored, and nothing may be allocated.
@@ -28,7 +28,7 @@ class SimulatedHeap {
 
  private:
   Arena arena_;
-  FirstFitHeap blocks_;
+  std::unique_ptr<BlockHeap> blocks_;
 };
 
 /// The heap from which this thread allocates; null: from the system's. Set by HeapGuard only.

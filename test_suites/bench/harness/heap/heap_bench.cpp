@@ -62,7 +62,7 @@ void play(benchmark::State& state, const std::vector<Step>& steps, int alignment
       state.SkipWithError("a sanitizer owns malloc");
       return;
     }
-    heap.emplace(FirstFitOptions{.alignment = alignment, .limit_bytes = 1u << 30});
+    heap.emplace(HeapOptions{.alignment = alignment, .limit_bytes = 1u << 30});
   }
   std::vector<void*> blocks(20'000, nullptr);
   for (auto _ : state) {

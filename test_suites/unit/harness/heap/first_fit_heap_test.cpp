@@ -1,4 +1,4 @@
-#include <orrery/harness/heap/first_fit_heap.hpp>
+#include <orrery/harness/heap/block_heap.hpp>
 
 #include <gtest/gtest.h>
 
@@ -14,10 +14,10 @@ namespace {
 
 constexpr std::uint64_t kLimit = 1 << 20;
 
-FirstFitOptions paper() {
+HeapOptions paper() {
   return {.alignment = 8, .limit_bytes = kLimit};
 }
-FirstFitOptions host() {
+HeapOptions host() {
   return {.alignment = 16, .limit_bytes = kLimit};
 }
 
@@ -29,7 +29,7 @@ std::ptrdiff_t distance(const void* from, const void* to) {
 // alignment 8, block = 8 + round_up(max(n, 1), 8), at least 16.
 TEST(FirstFitHeapTest, FollowsTheHandWorkedTrace) {
   TestHeap t(paper());
-  FirstFitHeap& heap = t.heap;
+  BlockHeap& heap = t.heap;
   void* a = heap.allocate(24);
   void* b = heap.allocate(40);
   void* c = heap.allocate(8);
@@ -76,7 +76,7 @@ TEST(FirstFitHeapTest, TagsAreFourBytesBeforeThePayloadAndAtTheBlocksEnd) {
 
 TEST(FirstFitHeapTest, PayloadCapacitiesAreThoseOfTheAlignment) {
   TestHeap eight(paper()), sixteen(host());
-  const auto capacity = [](FirstFitHeap& heap, std::size_t n) {
+  const auto capacity = [](BlockHeap& heap, std::size_t n) {
     return heap.usable_bytes(heap.allocate(n));
   };
   EXPECT_EQ(capacity(eight.heap, 0), 8u);
@@ -111,8 +111,8 @@ TEST(FirstFitHeapTest, MostRecentlyFreedBlockIsTakenFirst) {
 
 TEST(FirstFitHeapTest, RemainderGoesToTheFrontUnlessItKeepsItsPlace) {
   for (const bool keeps_place : {false, true}) {
-    FirstFitOptions options = paper();
-    options.remainder_keeps_place = keeps_place;
+    HeapOptions options = paper();
+    options.rules.remainder_keeps_place = keeps_place;
     TestHeap t(options);
     void* large = t.heap.allocate(120);  // 128
     t.heap.allocate(8);
@@ -129,8 +129,8 @@ TEST(FirstFitHeapTest, RemainderGoesToTheFrontUnlessItKeepsItsPlace) {
 
 TEST(FirstFitHeapTest, GrowthLeavesAFreeLastBlockUnlessItJoinsIt) {
   for (const bool joins : {false, true}) {
-    FirstFitOptions options = paper();
-    options.growth_joins_last_block = joins;
+    HeapOptions options = paper();
+    options.rules.growth_joins_last_block = joins;
     TestHeap t(options);
     void* last = t.heap.allocate(24);  // 32
     t.heap.release(last);
@@ -183,8 +183,8 @@ TEST(FirstFitHeapTest, ReallocMovesWhenItMustAndCountsBothBlocksAtThePeak) {
 
 TEST(FirstFitHeapTest, LastBlockMovesUnlessReallocGrowsTheTop) {
   for (const bool grows_top : {false, true}) {
-    FirstFitOptions options = paper();
-    options.realloc_grows_top = grows_top;
+    HeapOptions options = paper();
+    options.rules.realloc_grows_top = grows_top;
     TestHeap t(options);
     void* p = t.heap.allocate(24);
     EXPECT_EQ(t.heap.reallocate(p, 56) == p, grows_top);
@@ -213,7 +213,7 @@ TEST(FirstFitHeapTest, CallocZeroesAndRefusesAProductThatOverflows) {
 }
 
 TEST(FirstFitHeapTest, AlignedBlocksAreAlignedAndTheFrontIsFree) {
-  for (const FirstFitOptions& options : {paper(), host()}) {
+  for (const HeapOptions& options : {paper(), host()}) {
     TestHeap t(options);
     std::vector<void*> blocks;
     for (std::size_t alignment = 1; alignment <= 4096; alignment *= 2) {
@@ -234,7 +234,7 @@ TEST(FirstFitHeapTest, AlignedBlocksAreAlignedAndTheFrontIsFree) {
 }
 
 TEST(FirstFitHeapTest, LimitRefusesAndTheHeapGoesOn) {
-  FirstFitOptions options = paper();
+  HeapOptions options = paper();
   options.limit_bytes = 128;
   TestHeap t(options);
   void* a = t.heap.allocate(56);  // 64
@@ -333,10 +333,10 @@ TEST(FirstFitHeapTest, FindsAWriteAfterFreeIntoTheLinks) {
     t.heap.allocate(8);
     t.heap.release(a);
     t.heap.release(c);
-    std::memcpy(c, &value, 4);  // c's link to a
+    std::memcpy(c, &value, 4);
     EXPECT_FALSE(t.heap.check()) << value;
     const int found = t.faults;
-    EXPECT_EQ(t.heap.allocate(100), nullptr) << value;  // visits both blocks
+    EXPECT_EQ(t.heap.allocate(24), nullptr) << value;  // would take c
     EXPECT_GT(t.faults, found) << value;
     EXPECT_EQ(t.last.kind, HeapFault::Kind::kCorruptBlock);
   }
@@ -344,10 +344,10 @@ TEST(FirstFitHeapTest, FindsAWriteAfterFreeIntoTheLinks) {
 
 TEST(FirstFitHeapTest, OptionsOutsideTheirRangesAreRefused) {
   TestArena arena(4096);
-  EXPECT_THROW(FirstFitHeap(arena.base(), {.alignment = 4}), std::invalid_argument);
-  EXPECT_THROW(FirstFitHeap(arena.base(), {.limit_bytes = FirstFitHeap::kMaxLimit_bytes + 1}),
+  EXPECT_THROW(make_heap(arena.base(), {.alignment = 4}), std::invalid_argument);
+  EXPECT_THROW(make_heap(arena.base(), {.limit_bytes = BlockHeap::kMaxLimit_bytes + 1}),
                std::invalid_argument);
-  EXPECT_THROW(FirstFitHeap(arena.base() + 8, {.limit_bytes = 1024}), std::invalid_argument);
+  EXPECT_THROW(make_heap(arena.base() + 8, {.limit_bytes = 1024}), std::invalid_argument);
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 /// Memory for a heap under test, at no particular address.
 #pragma once
 
-#include <orrery/harness/heap/first_fit_heap.hpp>
+#include <orrery/harness/heap/block_heap.hpp>
 
 #include <cstddef>
 #include <memory>
@@ -11,8 +11,7 @@ namespace orrery {
 
 class TestArena {
  public:
-  explicit TestArena(std::size_t bytes)
-      : memory_(new (std::align_val_t(4096)) std::byte[bytes + FirstFitHeap::kOverhead_bytes]) {}
+  explicit TestArena(std::size_t bytes) : memory_(new (std::align_val_t(4096)) std::byte[bytes]) {}
   std::byte* base() { return memory_.get(); }
 
  private:
@@ -24,8 +23,10 @@ class TestArena {
 
 /// A heap on an arena of its own, that keeps the last fault.
 struct TestHeap {
-  explicit TestHeap(FirstFitOptions options)
-      : arena(static_cast<std::size_t>(options.limit_bytes)), heap(arena.base(), options) {
+  explicit TestHeap(const HeapOptions& options)
+      : arena(static_cast<std::size_t>(BlockHeap::arena_bytes(options))),
+        owner(make_heap(arena.base(), options)),
+        heap(*owner) {
     heap.set_fault_handler(
         [](void* self, const HeapFault& fault) {
           static_cast<TestHeap*>(self)->last = fault;
@@ -34,7 +35,8 @@ struct TestHeap {
         this);
   }
   TestArena arena;
-  FirstFitHeap heap;
+  std::unique_ptr<BlockHeap> owner;
+  BlockHeap& heap;
   HeapFault last;
   int faults = 0;
 };

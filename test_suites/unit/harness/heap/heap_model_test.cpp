@@ -1,15 +1,18 @@
 // Property: whatever is asked of it, the heap behaves as a map of disjoint ranges does.
 
-#include <orrery/harness/heap/first_fit_heap.hpp>
+#include <orrery/harness/heap/block_heap.hpp>
 #include <orrery/harness/kernel/bytes.hpp>
 
 #include <gtest/gtest.h>
 
+#include <cctype>
 #include <cstdint>
 #include <cstring>
 #include <iterator>
 #include <map>
 #include <random>
+#include <string>
+#include <vector>
 
 #include "test_arena.hpp"
 
@@ -18,8 +21,7 @@ namespace {
 
 struct Case {
   std::uint64_t seed;
-  int alignment;
-  bool remainder_keeps_place, growth_joins, realloc_grows_top;
+  HeapOptions options;
 };
 
 // The model: where each live range begins, how long it is, and a byte that fills it.
@@ -28,15 +30,9 @@ struct Range {
   unsigned char fill = 0;
 };
 
-class FirstFitHeapModelTest : public testing::TestWithParam<Case> {
+class HeapModelTest : public testing::TestWithParam<Case> {
  protected:
-  FirstFitHeapModelTest()
-      : t_({.alignment = GetParam().alignment,
-            .limit_bytes = 1 << 20,
-            .remainder_keeps_place = GetParam().remainder_keeps_place,
-            .growth_joins_last_block = GetParam().growth_joins,
-            .realloc_grows_top = GetParam().realloc_grows_top}),
-        random_(GetParam().seed) {}
+  HeapModelTest() : t_(GetParam().options), random_(GetParam().seed) {}
 
   std::uint64_t below(std::uint64_t n) { return random_() % n; }
   // Mostly small, sometimes large, as flight code asks.
@@ -44,8 +40,9 @@ class FirstFitHeapModelTest : public testing::TestWithParam<Case> {
 
   void enter(void* p, std::size_t bytes) {
     std::byte* begin = static_cast<std::byte*>(p);
-    ASSERT_EQ(reinterpret_cast<std::uintptr_t>(p) % static_cast<unsigned>(GetParam().alignment),
-              0u);
+    ASSERT_EQ(
+        reinterpret_cast<std::uintptr_t>(p) % static_cast<unsigned>(GetParam().options.alignment),
+        0u);
     const auto after = live_.lower_bound(begin);
     if (after != live_.end()) {
       ASSERT_LE(begin + bytes, after->first);
@@ -104,19 +101,21 @@ class FirstFitHeapModelTest : public testing::TestWithParam<Case> {
     ASSERT_EQ(f.resting_bytes, blocks);
     ASSERT_EQ(f.live_blocks, live_.size());
     ASSERT_EQ(f.allocations - f.frees, live_.size());
-    ASSERT_LE(f.heap_bytes, f.limit_bytes);
+    const bool scatters = GetParam().options.rules.policy == HeapPolicy::kScatter;
+    ASSERT_LE(scatters ? f.resting_bytes : f.heap_bytes, f.limit_bytes);
+    ASSERT_EQ(t_.faults, static_cast<int>(f.failures));  // none but those at the limit
     largest = largest_gap();
     ASSERT_EQ(f.largest_free_bytes, largest);
   }
   // Free blocks are joined, so they are exactly the gaps between live ones.
   std::uint64_t largest_gap() {
     std::uint64_t largest = 0;
-    std::byte* end = t_.arena.base() + GetParam().alignment - 4;
+    std::byte* end = t_.arena.base() + GetParam().options.alignment - 4;
     for (const auto& [begin, range] : live_) {
       largest = std::max<std::uint64_t>(largest, static_cast<std::uint64_t>(begin - 4 - end));
       end = begin + t_.heap.usable_bytes(begin) + 4;
     }
-    std::byte* top = t_.arena.base() + GetParam().alignment - 4 + t_.heap.heap_bytes();
+    std::byte* top = t_.arena.base() + GetParam().options.alignment - 4 + t_.heap.heap_bytes();
     return std::max<std::uint64_t>(largest, static_cast<std::uint64_t>(top - end));
   }
 
@@ -125,7 +124,7 @@ class FirstFitHeapModelTest : public testing::TestWithParam<Case> {
   std::map<std::byte*, Range> live_;
 };
 
-TEST_P(FirstFitHeapModelTest, AgreesWithDisjointRanges) {
+TEST_P(HeapModelTest, AgreesWithDisjointRanges) {
   for (int step = 0; step < 4000 && !HasFatalFailure(); ++step) {
     const std::uint64_t choice = below(16);
     if (live_.empty() || choice < 7) {
@@ -148,18 +147,42 @@ TEST_P(FirstFitHeapModelTest, AgreesWithDisjointRanges) {
   EXPECT_TRUE(t_.heap.check());
 }
 
+constexpr HeapPolicy kPolicies[] = {
+    HeapPolicy::kFirstFit,  HeapPolicy::kBestFit, HeapPolicy::kNextFit, HeapPolicy::kTlsf,
+    HeapPolicy::kFreeRtos4, HeapPolicy::kNewlib,  HeapPolicy::kScatter};
+
 std::vector<Case> cases() {
   std::vector<Case> all;
-  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     for (const int alignment : {8, 16}) {
-      for (const int rules : {0, 1, 2, 4, 7}) {
-        all.push_back({seed, alignment, (rules & 1) != 0, (rules & 2) != 0, (rules & 4) != 0});
+      for (const HeapPolicy policy : kPolicies) {
+        for (const unsigned rules : {0u, 1u, 2u, 4u, 15u}) {
+          if (policy > HeapPolicy::kNextFit && rules != 0 && rules != 15)
+            continue;  // its own rules
+          all.push_back({seed,
+                         {.alignment = alignment,
+                          .limit_bytes = 1 << 20,
+                          .rules = {.policy = policy,
+                                    .remainder_keeps_place = (rules & 1) != 0,
+                                    .growth_joins_last_block = (rules & 2) != 0,
+                                    .realloc_grows_top = (rules & 4) != 0,
+                                    .least_block_bytes = (rules & 8) != 0 ? 48u : 16u,
+                                    .poison = (rules & 8) != 0,
+                                    .seed = seed}}});
+        }
       }
     }
   }
   return all;
 }
-INSTANTIATE_TEST_SUITE_P(Seeds, FirstFitHeapModelTest, testing::ValuesIn(cases()));
+std::string name_of(const testing::TestParamInfo<Case>& info) {
+  std::string name = to_string(info.param.options.rules.policy);
+  for (char& c : name) {
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
+  }
+  return name + "_" + std::to_string(info.index);
+}
+INSTANTIATE_TEST_SUITE_P(Seeds, HeapModelTest, testing::ValuesIn(cases()), name_of);
 
 }  // namespace
 }  // namespace orrery
