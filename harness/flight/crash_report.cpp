@@ -69,6 +69,7 @@ std::string to_string(const CrashReport& report) {
     text += "  input, " + std::to_string(report.input.size()) +
             " bytes: " + first_bytes(report.input) + "\n";
   }
+  if (report.work != 0) text += "  work: " + std::to_string(report.work) + " edges\n";
   if (!report.backtrace.empty()) text += "  stack, innermost first:\n";
   for (std::size_t i = 0; i < report.backtrace.size(); ++i) {
     text += frame_line(i, report.backtrace[i]);

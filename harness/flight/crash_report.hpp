@@ -43,7 +43,9 @@ struct CrashReport {
   std::string call;                   // "load", "create", "input", "tick", "destroy"
   std::string port;                   // of an input
   ByteBuffer input;                   // the bytes of that input
+  std::uint64_t work = 0;             // edges that the call had counted; 0 without COUNT_WORK
   std::vector<StackFrame> backtrace;  // empty where the library returned a status
+  std::uint64_t seed = 0;             // of the run; 0 outside of one
 };
 
 /// Several lines for people. Addresses are in it: never for a fingerprint.

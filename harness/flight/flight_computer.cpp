@@ -14,12 +14,18 @@ constexpr EventKind kInput{101, "flight input"};
 constexpr EventKind kTick{102, "flight tick"};
 constexpr EventKind kOutput{103, "flight output"};
 constexpr EventKind kProcessorFree{104, "processor free"};
+constexpr EventKind kReboot{105, "flight reboot"};
+constexpr EventKind kPowerCycle{106, "flight power cycle"};
+constexpr EventKind kKill{107, "flight kill"};
+constexpr EventKind kBootLoop{108, "boot_loop"};
 
 constexpr std::size_t kMostWaiting = 64;
 constexpr std::uint64_t kMostWaiting_bytes = 1 << 20;
 // A tick that asks for a time that has passed fires again at once. So many in a row are no plan:
 // the usual cause is a period given where a time is expected.
 constexpr int kMostTicksAtOneInstant = 10'000;
+constexpr std::size_t kMostBoots = 10;  // within kBootWindow
+constexpr Duration kBootWindow = 60s;
 
 }  // namespace
 
@@ -28,16 +34,24 @@ class FlightComputer::Impl {
   Impl(EventLoop& loop, OwnerId owner, FlightProcessOptions options, Hooks hooks);
 
   void boot();
+  void reset(SimTime t, const EventKind& kind, ResetCause cause, Duration boot_delay);
   void shut_down();
   void deliver(std::string_view port, Bytes bytes, OwnerId origin);
   std::uint32_t find_port(std::string_view name, PortDirection direction) const;
   std::uint32_t require_input(const char* function, std::string_view name) const;
   std::int64_t onboard_ns() const { return clock.onboard_ns(loop_.now()); }
+  bool alive() const { return process != nullptr && process->alive(); }
+  HeapFigures heap() const;
+  Duration host_time() const;
 
-  FlightProcess process;
+  FlightProcessOptions options;
+  std::unique_ptr<FlightProcess> process;
+  std::vector<FlightPort> ports;
   OnboardClock clock;
-  std::uint64_t crashes = 0, calls = 0, rejected = 0, inputs_lost = 0, outputs_discarded = 0;
+  std::uint64_t crashes = 0, boots = 0, calls = 0, rejected = 0, inputs_lost = 0,
+                outputs_discarded = 0;
   std::vector<std::uint64_t> dropped;  // by port
+  bool boot_loop = false;
 
  private:
   struct Waiting {
@@ -48,6 +62,13 @@ class FlightComputer::Impl {
   void on_input(std::uint32_t port, std::uint32_t payload);
   void on_tick();
   void on_output(std::uint32_t port, std::uint32_t payload, std::uint32_t life);
+  void on_boot(ResetCause cause);
+  void on_reset(const EventKind& kind, ResetCause cause, Duration boot_delay);
+  void on_boot_loop();
+  void schedule_boot(SimTime t, ResetCause cause);
+  bool boots_too_often();
+  void load_afresh();
+  void end_life();
   void on_processor_free();
 
   bool busy() const { return loop_.now() < busy_until_; }
@@ -71,7 +92,14 @@ class FlightComputer::Impl {
   Hooks hooks_;
   internal::PayloadPool payloads_;
 
-  bool booted_ = false;
+  // Of earlier lives.
+  FlightProcess::Storage storage_;
+  std::uint64_t high_water_before_ = 0;
+  Duration host_time_before_{};
+
+  bool booted_ = false;  // or about to be
+  EventHandle boot_event_;
+  std::vector<SimTime> recent_boots_;
   SimTime busy_until_;
   std::vector<Waiting> waiting_;  // in order of arrival
   std::uint64_t waiting_bytes_ = 0;
@@ -84,22 +112,24 @@ class FlightComputer::Impl {
   SimTime last_tick_;
   int ticks_here_ = 0;
 
-  std::uint32_t life_ = 0;  // counts crashes: an output belongs to one life
+  std::uint32_t life_ = 0;  // counts ends: an output belongs to one life
   SimTime died_;
 };
 
-FlightComputer::Impl::Impl(EventLoop& loop, OwnerId owner, FlightProcessOptions options,
+FlightComputer::Impl::Impl(EventLoop& loop, OwnerId owner, FlightProcessOptions flight_options,
                            Hooks hooks)
-    : process(std::move(options)),
+    : options(std::move(flight_options)),
+      process(std::make_unique<FlightProcess>(options)),
+      ports(process->ports()),
       loop_(loop),
       owner_(owner),
       hooks_(std::move(hooks)),
       busy_until_(loop.now()) {
-  if (process.options().execution_time < Duration{0}) {
+  if (options.execution_time < Duration{0}) {
     throw std::invalid_argument("FlightComputer: execution_time = " +
-                                to_string(process.options().execution_time) + "; it is 0 or more");
+                                to_string(options.execution_time) + "; it is 0 or more");
   }
-  dropped.resize(process.ports().size(), 0);
+  dropped.resize(ports.size(), 0);
   waiting_.reserve(kMostWaiting);
 }
 
@@ -107,7 +137,6 @@ FlightComputer::Impl::Impl(EventLoop& loop, OwnerId owner, FlightProcessOptions 
 
 std::uint32_t FlightComputer::Impl::find_port(std::string_view name,
                                               PortDirection direction) const {
-  const std::vector<FlightPort>& ports = process.ports();
   for (std::uint32_t i = 0; i < ports.size(); ++i) {
     if (ports[i].direction == direction && ports[i].name == name) return i;
   }
@@ -119,32 +148,111 @@ std::uint32_t FlightComputer::Impl::require_input(const char* function,
   const std::uint32_t index = find_port(name, PortDirection::kIn);
   if (index != UINT32_MAX) return index;
   std::string known;
-  for (const FlightPort& port : process.ports()) {
+  for (const FlightPort& port : ports) {
     if (port.direction == PortDirection::kIn) known += (known.empty() ? "" : ", ") + port.name;
   }
   throw std::invalid_argument(std::string("FlightComputer::") + function + ": " +
-                              process_name(process.options()) + " has no input port \"" +
-                              std::string(name) + "\"; it has " + (known.empty() ? "none" : known));
+                              process_name(options) + " has no input port \"" + std::string(name) +
+                              "\"; it has " + (known.empty() ? "none" : known));
 }
 
 // ---- events
 
 void FlightComputer::Impl::boot() {
   if (booted_) {
-    throw std::logic_error("FlightComputer::boot: " + process_name(process.options()) +
-                           " was booted before");
+    throw std::logic_error("FlightComputer::boot: " + process_name(options) + " was booted before");
   }
   booted_ = true;
-  loop_.schedule(loop_.now(), {Phase::kFault, owner_, owner_, &kBoot}, [this] {
-    ++calls;
-    busy_until_ = loop_.now() + process.options().execution_time;
-    take_over(process.create(loop_.now(), onboard_ns(), 0, ORRERY_POWER_ON));
-  });
+  schedule_boot(loop_.now(), ResetCause::kPowerOn);
+}
+
+void FlightComputer::Impl::schedule_boot(SimTime t, ResetCause cause) {
+  boot_event_ =
+      loop_.schedule(t, {Phase::kFault, owner_, owner_, &kBoot}, [this, cause] { on_boot(cause); });
+}
+
+void FlightComputer::Impl::on_boot(ResetCause cause) {
+  boot_event_ = {};
+  if (boots_too_often()) {
+    boot_loop = true;
+    loop_.schedule(loop_.now(), {Phase::kFault, owner_, owner_, &kBootLoop},
+                   [this] { on_boot_loop(); });
+    return;
+  }
+  if (boots > 0) load_afresh();
+  ++calls;
+  busy_until_ = loop_.now() + options.execution_time;
+  const auto boot_count = static_cast<std::uint32_t>(boots++);
+  take_over(process->create(loop_.now(), onboard_ns(), boot_count, cause));
+}
+
+void FlightComputer::Impl::on_boot_loop() {
+  warn("boot loop: more than " + std::to_string(kMostBoots) + " boots within " +
+       to_string(kBootWindow) + "; the process stays off");
+}
+
+bool FlightComputer::Impl::boots_too_often() {
+  const SimTime now = loop_.now();
+  std::erase_if(recent_boots_, [now](SimTime t) { return now - t >= kBootWindow; });
+  if (recent_boots_.size() == kMostBoots) return true;
+  recent_boots_.push_back(now);
+  return false;
+}
+
+// The old one goes first, so that file and arena are those of its first life, and so are pointers.
+void FlightComputer::Impl::load_afresh() {
+  if (process != nullptr) {
+    high_water_before_ = std::max(high_water_before_, process->heap().high_water_bytes);
+    host_time_before_ += process->host_time_in_flight();
+    storage_ = process->storage();
+    process.reset();
+  }
+  process = std::make_unique<FlightProcess>(options);
+  process->set_storage(storage_);
+}
+
+HeapFigures FlightComputer::Impl::heap() const {
+  HeapFigures figures = process == nullptr ? HeapFigures{} : process->heap();
+  figures.high_water_bytes = std::max(figures.high_water_bytes, high_water_before_);
+  return figures;
+}
+
+Duration FlightComputer::Impl::host_time() const {
+  return host_time_before_ + (process == nullptr ? Duration{} : process->host_time_in_flight());
+}
+
+void FlightComputer::Impl::reset(SimTime t, const EventKind& kind, ResetCause cause,
+                                 Duration boot_delay) {
+  if (boot_delay <= Duration{0}) {
+    throw std::invalid_argument("FlightComputer: boot delay = " + to_string(boot_delay) + " of " +
+                                process_name(options) + "; it is above 0");
+  }
+  if (!booted_ && t <= loop_.now()) {
+    throw std::logic_error("FlightComputer: " + process_name(options) +
+                           " is to be reset, or killed, before it has booted");
+  }
+  loop_.schedule(t, {Phase::kFault, owner_, owner_, &kind},
+                 [this, &kind, cause, boot_delay] { on_reset(kind, cause, boot_delay); });
+}
+
+void FlightComputer::Impl::on_reset(const EventKind& kind, ResetCause cause, Duration boot_delay) {
+  if (alive()) {
+    process->cut_off();
+    end_life();
+  }
+  loop_.cancel(boot_event_);
+  boot_event_ = {};
+  boot_loop = false;
+  if (&kind != &kKill) schedule_boot(loop_.now() + boot_delay, cause);
+  if (&kind == &kPowerCycle) {
+    if (!options.clock_keeps_power) clock.set_offset(-Duration(to_ns(loop_.now())));
+    if (hooks_.on_power_cycle) hooks_.on_power_cycle();
+  }
 }
 
 void FlightComputer::Impl::deliver(std::string_view port, Bytes bytes, OwnerId origin) {
   const std::uint32_t index = require_input("deliver", port);
-  const FlightPort& p = process.ports()[index];
+  const FlightPort& p = ports[index];
   const auto schedule = [&](Bytes part) {
     const std::uint32_t payload = payloads_.put(part);
     loop_.schedule(loop_.now(), {Phase::kDelivery, owner_, origin, &kInput},
@@ -160,7 +268,7 @@ void FlightComputer::Impl::deliver(std::string_view port, Bytes bytes, OwnerId o
 
 void FlightComputer::Impl::on_input(std::uint32_t port, std::uint32_t payload) {
   loop_.fingerprint_payload(payloads_[payload]);
-  if (!process.alive()) {
+  if (!alive()) {
     ++inputs_lost;
     payloads_.give_back(payload);
   } else if (busy() || others_wait()) {
@@ -192,7 +300,7 @@ void FlightComputer::Impl::wake_when_free() {
 // One call, the one that has been due for longest; at one instant an input before the tick.
 void FlightComputer::Impl::on_processor_free() {
   free_event_ = {};
-  if (!process.alive() || !others_wait()) return;
+  if (!alive() || !others_wait()) return;
   if (tick_waits_ && (waiting_.empty() || tick_due_ < waiting_.front().arrival)) {
     run_tick();
   } else {
@@ -204,7 +312,7 @@ void FlightComputer::Impl::on_processor_free() {
 }
 
 void FlightComputer::Impl::run_input(std::uint32_t port, std::uint32_t payload) {
-  const FlightPort& p = process.ports()[port];
+  const FlightPort& p = ports[port];
   const internal::TakenPayload taken(payloads_, payload);
   if (taken.bytes().size() > p.max_bytes) {
     ++rejected;
@@ -214,8 +322,8 @@ void FlightComputer::Impl::run_input(std::uint32_t port, std::uint32_t payload) 
     return;
   }
   ++calls;
-  busy_until_ = loop_.now() + process.options().execution_time;
-  take_over(process.input(loop_.now(), onboard_ns(), p, taken.bytes()));
+  busy_until_ = loop_.now() + options.execution_time;
+  take_over(process->input(loop_.now(), onboard_ns(), p, taken.bytes()));
 }
 
 void FlightComputer::Impl::on_tick() {
@@ -233,20 +341,20 @@ void FlightComputer::Impl::run_tick() {
   tick_waits_ = false;
   if (!makes_progress()) return;
   ++calls;
-  busy_until_ = loop_.now() + process.options().execution_time;
-  take_over(process.tick(loop_.now(), onboard_ns()));
+  busy_until_ = loop_.now() + options.execution_time;
+  take_over(process->tick(loop_.now(), onboard_ns()));
 }
 
 bool FlightComputer::Impl::makes_progress() {
   if (last_tick_ != loop_.now()) ticks_here_ = 0;
   last_tick_ = loop_.now();
   if (++ticks_here_ <= kMostTicksAtOneInstant) return true;
-  process.end(CrashKind::kNoProgress,
-              std::to_string(kMostTicksAtOneInstant) +
-                  " ticks at one instant: each asked for a time that had passed already",
-              loop_.now(), onboard_ns());
+  process->end(CrashKind::kNoProgress,
+               std::to_string(kMostTicksAtOneInstant) +
+                   " ticks at one instant: each asked for a time that had passed already",
+               loop_.now(), onboard_ns());
   bury();
-  if (hooks_.on_crash) hooks_.on_crash(process.crash());
+  if (hooks_.on_crash) hooks_.on_crash(process->crash());
   return false;
 }
 
@@ -259,7 +367,7 @@ void FlightComputer::Impl::on_output(std::uint32_t port, std::uint32_t payload,
     return;
   }
   loop_.fingerprint_payload(taken.bytes());
-  if (hooks_.on_output) hooks_.on_output(process.ports()[port].name, taken.bytes());
+  if (hooks_.on_output) hooks_.on_output(ports[port].name, taken.bytes());
 }
 
 // ---- after a call
@@ -271,16 +379,16 @@ void FlightComputer::Impl::take_over(CallOutcome outcome) {
   } else {
     if (outcome == CallOutcome::kRejected) ++rejected;
     release_outputs();
-    if (const auto request = process.tick_request()) set_tick(*request);
+    if (const auto request = process->tick_request()) set_tick(*request);
     if (others_wait()) wake_when_free();
   }
   tell(outcome);
 }
 
 void FlightComputer::Impl::release_outputs() {
-  for (std::size_t i = 0; i < process.output_count(); ++i) {
-    const FlightProcess::Output output = process.output(i);
-    const std::uint32_t port = static_cast<std::uint32_t>(output.port - process.ports().data());
+  for (std::size_t i = 0; i < process->output_count(); ++i) {
+    const FlightProcess::Output output = process->output(i);
+    const std::uint32_t port = static_cast<std::uint32_t>(output.port - process->ports().data());
     const std::uint32_t payload = payloads_.put(output.data);
     const std::uint32_t life = life_;
     loop_.schedule(busy_until_, {Phase::kOutput, owner_, owner_, &kOutput},
@@ -291,7 +399,7 @@ void FlightComputer::Impl::release_outputs() {
 void FlightComputer::Impl::set_tick(std::int64_t onboard_ns) {
   withdraw_tick();
   if (onboard_ns < 0) return;
-  if (!process.has_tick()) {
+  if (!process->has_tick()) {
     if (!warned_of_tick_) warn("a tick was requested, but the library has no tick function");
     warned_of_tick_ = true;
     return;
@@ -309,6 +417,11 @@ void FlightComputer::Impl::withdraw_tick() {
 
 void FlightComputer::Impl::bury() {
   ++crashes;
+  end_life();
+}
+
+void FlightComputer::Impl::end_life() {
+  busy_until_ = loop_.now();
   ++life_;
   died_ = loop_.now();
   lose_what_waits();
@@ -326,13 +439,13 @@ void FlightComputer::Impl::lose_what_waits() {
 
 void FlightComputer::Impl::tell(CallOutcome outcome) {
   if (hooks_.on_log) {
-    for (std::size_t i = 0; i < process.log_count(); ++i) {
-      const FlightProcess::LogLine line = process.log_line(i);
+    for (std::size_t i = 0; i < process->log_count(); ++i) {
+      const FlightProcess::LogLine line = process->log_line(i);
       hooks_.on_log(line.level, line.text);
     }
   }
-  if (hooks_.on_call) hooks_.on_call(process.call_record());
-  if (outcome == CallOutcome::kCrashed && hooks_.on_crash) hooks_.on_crash(process.crash());
+  if (hooks_.on_call) hooks_.on_call(process->call_record());
+  if (outcome == CallOutcome::kCrashed && hooks_.on_crash) hooks_.on_crash(process->crash());
 }
 
 void FlightComputer::Impl::warn(const std::string& line) {
@@ -340,8 +453,9 @@ void FlightComputer::Impl::warn(const std::string& line) {
 }
 
 void FlightComputer::Impl::shut_down() {
-  if (!process.alive()) return;
-  const CallOutcome outcome = process.shut_down(loop_.now(), onboard_ns());
+  loop_.cancel(boot_event_);
+  if (!alive()) return;
+  const CallOutcome outcome = process->shut_down(loop_.now(), onboard_ns());
   if (outcome == CallOutcome::kCrashed) {
     bury();
   } else {
@@ -360,14 +474,23 @@ FlightComputer::~FlightComputer() = default;
 void FlightComputer::boot() {
   impl_->boot();
 }
+void FlightComputer::reboot(SimTime t, Duration boot_delay, ResetCause cause) {
+  impl_->reset(t, kReboot, cause, boot_delay);
+}
+void FlightComputer::power_cycle(SimTime t, Duration boot_delay) {
+  impl_->reset(t, kPowerCycle, ResetCause::kPowerOn, boot_delay);
+}
+void FlightComputer::kill(SimTime t) {
+  impl_->reset(t, kKill, ResetCause::kCommanded, Duration{1});
+}
 void FlightComputer::shut_down() {
   impl_->shut_down();
 }
 const FlightProcessOptions& FlightComputer::options() const {
-  return impl_->process.options();
+  return impl_->options;
 }
 const std::vector<FlightPort>& FlightComputer::ports() const {
-  return impl_->process.ports();
+  return impl_->ports;
 }
 bool FlightComputer::has_input(std::string_view port) const {
   return impl_->find_port(port, PortDirection::kIn) != UINT32_MAX;
@@ -379,7 +502,13 @@ void FlightComputer::deliver(std::string_view port, Bytes bytes, OwnerId origin)
   impl_->deliver(port, bytes, origin);
 }
 bool FlightComputer::alive() const {
-  return impl_->process.alive();
+  return impl_->alive();
+}
+std::uint64_t FlightComputer::boots() const {
+  return impl_->boots;
+}
+bool FlightComputer::stopped_by_boot_loop() const {
+  return impl_->boot_loop;
 }
 std::uint64_t FlightComputer::crashes() const {
   return impl_->crashes;
@@ -400,10 +529,11 @@ std::uint64_t FlightComputer::dropped(std::string_view port) const {
   return impl_->dropped[impl_->require_input("dropped", port)];
 }
 HeapFigures FlightComputer::heap() const {
-  return impl_->process.heap();
+  return impl_->heap();
 }
 void FlightComputer::set_heap_limit(std::uint64_t bytes) {
-  impl_->process.set_heap_limit(bytes);
+  if (impl_->process != nullptr) impl_->process->set_heap_limit(bytes);
+  impl_->options.heap_bytes = bytes;
 }
 std::int64_t FlightComputer::onboard_ns() const {
   return impl_->onboard_ns();
@@ -412,7 +542,7 @@ OnboardClock& FlightComputer::clock() {
   return impl_->clock;
 }
 Duration FlightComputer::host_time_in_flight() const {
-  return impl_->process.host_time_in_flight();
+  return impl_->host_time();
 }
 
 }  // namespace orrery

@@ -24,7 +24,11 @@ namespace orrery {
 ///          fires when the call that asked for it has ended.
 /// Crash    Outputs and tick request of the crashed call are discarded, as are outputs that had not
 ///          left yet and waiting inputs; then Hooks::on_crash decides. A dead process gets nothing.
-/// Events   Kinds 100-104; none allocates once the buffers have grown to their sizes.
+/// Reset    A reboot loads the library afresh from the same file: memory, queue, tick and outputs
+///          that had not left are lost, non-volatile storage is kept. While it is off inputs are
+///          lost and counted. More than 10 boots within 60 s are a boot loop: the process stays
+///          off. The onboard clock goes on, unless a power cycle takes its power (FlightOptions).
+/// Events   Kinds 100-108; none allocates once the buffers have grown to their sizes.
 class FlightComputer {
  public:
   /// Called in simulator context; each may be empty. on_crash and on_output may throw.
@@ -33,6 +37,7 @@ class FlightComputer {
     std::function<void(LogLevel, std::string_view line)> on_log;
     std::function<void(const CrashReport&)> on_crash;
     std::function<void(const CallRecord&)> on_call;
+    std::function<void()> on_power_cycle;  // devices start cold
   };
 
   /// Loads the library. The loop must outlive the computer.
@@ -45,6 +50,15 @@ class FlightComputer {
   /// Schedules `create` now, before the devices and inputs of this instant.
   /// @throws std::logic_error  booted before.
   void boot();
+  /// From `t` on, before anything else at that instant: ends the process without its destroy, and
+  /// boots it again `boot_delay` later, also where it had crashed, or was killed.
+  /// @throws std::invalid_argument  a delay of 0 or less, t before now; std::logic_error  not
+  ///                                booted yet, and t is no later than that.
+  void reboot(SimTime t, Duration boot_delay, ResetCause cause = ResetCause::kCommanded);
+  /// A reboot with ResetCause::kPowerOn, and Hooks::on_power_cycle at `t`.
+  void power_cycle(SimTime t, Duration boot_delay);
+  /// As reboot(), but it stays off.
+  void kill(SimTime t);
   /// Orderly end, now; waiting inputs and the tick are dropped. Nothing if not alive.
   void shut_down();
 
@@ -60,11 +74,13 @@ class FlightComputer {
 
   bool alive() const;
   std::uint64_t crashes() const;
+  std::uint64_t boots() const;
+  bool stopped_by_boot_loop() const;
   std::uint64_t calls() const;              // create, inputs, ticks
   std::uint64_t rejected() const;           // inputs and ticks that the library rejected, and
                                             // packets too long for their port
   std::uint64_t inputs_lost() const;        // came while the process was not alive, or died waiting
-  std::uint64_t outputs_discarded() const;  // by a crash
+  std::uint64_t outputs_discarded() const;  // by a crash or a reset
   /// Dropped because the queue was full. @throws std::invalid_argument  no such input port.
   std::uint64_t dropped(std::string_view port) const;
 

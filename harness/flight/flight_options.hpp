@@ -8,6 +8,8 @@
 
 namespace orrery {
 
+class RandomStreams;
+
 enum class Isolation : std::uint8_t {
   kCopy,    // a private copy of the library: each process has its own globals
   kShared,  // one load for all processes, as in the paper: for libraries without globals
@@ -30,6 +32,8 @@ struct FlightProcessOptions {
   HeapExhaustion heap_exhaustion = HeapExhaustion::kNull;
   std::uint64_t storage_bytes = 1'048'576;  // non-volatile, all slots together
   Duration execution_time{0};               // of every call; outputs leave when it has passed
+  RandomStreams* random = nullptr;          // of the run; null: a set of the process's own
+  bool clock_keeps_power = false;  // false: after a power cycle the clock starts at its zero
 };
 
 /// "dsc/gnc": how messages and records name a process.

@@ -1,6 +1,7 @@
 #include <orrery/harness/flight/flight_process_impl.hpp>
 #include <orrery/harness/flight/port_table.hpp>
 #include <orrery/harness/flight/stack_frames.hpp>
+#include <orrery/harness/kernel/random.hpp>
 
 #include <cstdio>
 #include <cstdlib>
@@ -149,7 +150,7 @@ void FlightProcess::Impl::run_library_call() {
 }
 
 CallOutcome FlightProcess::Impl::create(SimTime truth, std::int64_t onboard_ns,
-                                        std::uint32_t boot_count, std::uint32_t reset_cause) {
+                                        std::uint32_t boot_count, ResetCause cause) {
   require_between_calls("create");
   if (created) throw std::logic_error("FlightProcess::create: " + name + " was created before");
   created = alive = true;
@@ -158,7 +159,7 @@ CallOutcome FlightProcess::Impl::create(SimTime truth, std::int64_t onboard_ns,
   boot.spacecraft = options.spacecraft.c_str();
   boot.process = options.process.c_str();
   boot.boot_count = boot_count;
-  boot.reset_cause = reset_cause;
+  boot.reset_cause = static_cast<std::uint32_t>(cause);
   boot.config = options.config.data();
   boot.config_bytes = static_cast<std::uint32_t>(options.config.size());
   return call({.call = Call::kCreate, .onboard_ns = onboard_ns, .boot = &boot}, truth, {});
@@ -237,6 +238,7 @@ void FlightProcess::Impl::die(CrashKind kind, std::string message, SimTime truth
   crash.status = arguments.status;
   crash.message = std::move(message);
   crash.call = call_name(arguments.call);
+  crash.seed = options.random == nullptr ? 0 : options.random->seed();
   if (arguments.port != nullptr) {
     crash.port = arguments.port->name;
     crash.input = input_;
@@ -244,6 +246,10 @@ void FlightProcess::Impl::die(CrashKind kind, std::string message, SimTime truth
   crash.backtrace = internal::stack_frames(capture_, library->loaded_path());
   capture_.frame_count = 0;
 
+  cut_off();
+}
+
+void FlightProcess::Impl::cut_off() {
   alive = false;
   crashed = true;
   outputs.clear();
@@ -325,8 +331,12 @@ bool FlightProcess::has_tick() const {
 }
 
 CallOutcome FlightProcess::create(SimTime truth, std::int64_t onboard_ns, std::uint32_t boot_count,
-                                  std::uint32_t reset_cause) {
-  return impl_->create(truth, onboard_ns, boot_count, reset_cause);
+                                  ResetCause cause) {
+  return impl_->create(truth, onboard_ns, boot_count, cause);
+}
+void FlightProcess::cut_off() {
+  impl_->require_between_calls("cut_off");
+  if (!impl_->crashed && !impl_->ended) impl_->cut_off();
 }
 
 CallOutcome FlightProcess::input(SimTime truth, std::int64_t onboard_ns, const FlightPort& port,

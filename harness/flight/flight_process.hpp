@@ -33,6 +33,9 @@ struct FlightPort {
 /// Levels of log lines, as the ABI numbers them.
 enum class LogLevel : std::int32_t { kDebug = 0, kInfo = 1, kWarning = 2, kError = 3 };
 
+/// Why a process boots, as the ABI numbers it.
+enum class ResetCause : std::uint8_t { kPowerOn = 0, kCommanded = 1, kWatchdog = 2, kCrash = 3 };
+
 /// What one call of a process left behind.
 enum class CallOutcome : std::uint8_t { kDone, kRejected, kCrashed };
 
@@ -72,14 +75,18 @@ class FlightProcess {
 
   /// The calls. `truth` is for reports only, the library sees `onboard_ns`.
   /// @throws std::logic_error  create() twice; the others unless alive(); any within another call.
-  CallOutcome create(SimTime truth, std::int64_t onboard_ns, std::uint32_t boot_count,
-                     std::uint32_t reset_cause);
+  CallOutcome create(SimTime truth, std::int64_t onboard_ns, std::uint32_t boot_count = 0,
+                     ResetCause cause = ResetCause::kPowerOn);
   CallOutcome input(SimTime truth, std::int64_t onboard_ns, const FlightPort& port, Bytes data);
   CallOutcome tick(SimTime truth, std::int64_t onboard_ns);
   /// Orderly end: destroy, then the library's static destructors.
   CallOutcome shut_down(SimTime truth, std::int64_t onboard_ns);
 
-  bool alive() const;     // created, neither crashed nor shut down
+  /// Its memory is gone: a reset, a power cut. No code of it runs any more.
+  /// @throws std::logic_error  within a call.
+  void cut_off();
+
+  bool alive() const;     // created, and since then no crash, shut_down() or cut_off()
   bool has_tick() const;  // the library has a tick function
 
   /// Of the last call, until the next; none after a crash.

@@ -38,7 +38,8 @@ class FlightProcess::Impl {
 
   CallOutcome call(internal::CallArguments arguments, SimTime truth, Bytes data);
   CallOutcome create(SimTime truth, std::int64_t onboard_ns, std::uint32_t boot_count,
-                     std::uint32_t reset_cause);
+                     ResetCause cause);
+  void cut_off();
   bool shut_down_library();
   void require_alive(const char* function) const;
   void require_between_calls(const char* function) const;
@@ -60,7 +61,9 @@ class FlightProcess::Impl {
   std::unique_ptr<SimulatedHeap> heap;     // null where heaps are not simulated
   std::unique_ptr<FlightLibrary> library;  // unloaded while the heap is still there
 
-  bool created = false, alive = false, crashed = false, ended = false;
+  bool created = false, alive = false;
+  bool crashed = false;  // or cut off: its destructors never run
+  bool ended = false;    // in good order
   CallRecord record;
   CrashReport crash;
   std::optional<std::int64_t> tick_request;

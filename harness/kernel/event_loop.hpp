@@ -47,6 +47,8 @@ class EventLoop {
   EventHandle schedule(SimTime t, const EventSpec& spec, Action action);
   /// True if the event was pending; false if it has run, was cancelled or never was.
   bool cancel(EventHandle handle);
+  /// False if it has run, was cancelled or never was.
+  bool pending(EventHandle handle) const { return queue_.pending(handle); }
 
   /// Executes all events with time <= t, in order, then sets now() to t.
   /// @throws std::invalid_argument  t before now().

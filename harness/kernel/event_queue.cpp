@@ -180,10 +180,15 @@ bool EventQueue::pop(SimTime latest, Event& event) {
   return false;
 }
 
-bool EventQueue::cancel(EventHandle handle) {
+bool EventQueue::pending(EventHandle handle) const {
   if (handle.slot >= slots_.size()) return false;
+  const Slot& slot = slots_[handle.slot];
+  return slot.generation == handle.generation && slot.action;
+}
+
+bool EventQueue::cancel(EventHandle handle) {
+  if (!pending(handle)) return false;
   Slot& slot = slots_[handle.slot];
-  if (slot.generation != handle.generation || !slot.action) return false;
   // Destroyed on return, when the queue is whole again: captures may have destructors.
   const Action cancelled = std::move(slot.action);
   ++slot.generation;

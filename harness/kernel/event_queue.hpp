@@ -33,6 +33,7 @@ class EventQueue {
 
   /// True if the event was pending; its action is destroyed at once.
   bool cancel(EventHandle handle);
+  bool pending(EventHandle handle) const;
 
   /// Moves the earliest event to `event` if its time is <= `latest`; false if there is none.
   bool pop(SimTime latest, Event& event);

@@ -40,7 +40,7 @@ BENCHMARK(BM_Boundary_ContainedCall);
 
 void BM_FlightProcess_InputAndOutput(benchmark::State& state) {
   FlightProcess process(subject());
-  process.create(kStart, 0, 0, 0);
+  process.create(kStart, 0);
   const std::byte message[32] = {std::byte{'e'}};  // it echoes the other 31
   for (auto _ : state) process.input(kStart, 0, process.ports()[0], message);
 }
@@ -74,7 +74,7 @@ void BM_FlightProcess_Crash(benchmark::State& state) {
   for (auto _ : state) {
     state.PauseTiming();
     auto process = std::make_unique<FlightProcess>(subject());
-    process->create(kStart, 0, 0, 0);
+    process->create(kStart, 0);
     state.ResumeTiming();
     process->input(kStart, 0, process->ports()[0], message);
     state.PauseTiming();

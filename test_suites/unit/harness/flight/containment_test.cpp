@@ -29,7 +29,7 @@ FlightProcessOptions options(const std::string& library = "flight_test_subject")
 
 std::unique_ptr<FlightProcess> created(const FlightProcessOptions& o) {
   auto process = std::make_unique<FlightProcess>(o);
-  EXPECT_EQ(process->create(kTruth, 5, 0, 0), CallOutcome::kDone);
+  EXPECT_EQ(process->create(kTruth, 5), CallOutcome::kDone);
   return process;
 }
 
@@ -137,7 +137,7 @@ TEST(ContainmentTest, CreateThatFailsIsABootFailure) {
   FlightProcessOptions o = options();
   o.config = "refuse";
   FlightProcess process(o);
-  EXPECT_EQ(process.create(kTruth, 0, 0, 0), CallOutcome::kCrashed);
+  EXPECT_EQ(process.create(kTruth, 0), CallOutcome::kCrashed);
   EXPECT_EQ(process.crash().kind, CrashKind::kBootFailure);
   EXPECT_EQ(process.crash().call, "create");
   EXPECT_FALSE(process.alive());
@@ -183,7 +183,7 @@ TEST(ContainmentTest, MemoryOfADeadProcessIsGone) {
 TEST(ContainmentTest, AThousandCrashesLeaveAThousandAndFirstFlying) {
   for (int i = 0; i < 1000; ++i) {
     FlightProcess process(options());
-    process.create(kTruth, 0, 0, 0);
+    process.create(kTruth, 0);
     ASSERT_EQ(tell(process, order(i % 2 == 0 ? "!s" : "!a")), CallOutcome::kCrashed);
   }
   expect_simulator_unharmed();
@@ -193,7 +193,7 @@ TEST(ContainmentTest, FloatingPointControlIsTheSimulatorsAgainAfterEveryCall) {
   const auto before = internal::FloatingPointControl::read();
   FlightProcess process(options("flight_test_fast_math"));
   EXPECT_EQ(internal::FloatingPointControl::read(), before);
-  process.create(kTruth, 0, 0, 0);
+  process.create(kTruth, 0);
   for (int i = 0; i < 2; ++i) {
     EXPECT_EQ(tell(process, {}), CallOutcome::kDone);
     EXPECT_EQ(text_of(process.output(0).data), "\1");  // the denormal survived
@@ -203,7 +203,7 @@ TEST(ContainmentTest, FloatingPointControlIsTheSimulatorsAgainAfterEveryCall) {
 
 TEST(ContainmentTest, ChangedFloatingPointControlIsReportedOnce) {
   FlightProcess process(options("flight_test_fast_math"));
-  process.create(kTruth, 0, 0, 0);
+  process.create(kTruth, 0);
   std::size_t lines = process.log_count();
   for (int i = 0; i < 3; ++i) {
     tell(process, {});

@@ -27,7 +27,7 @@ class FlightProcessTest : public testing::Test {
   }
   static std::unique_ptr<FlightProcess> created(const FlightProcessOptions& o) {
     auto process = std::make_unique<FlightProcess>(o);
-    EXPECT_EQ(process->create(kTruth, 5, 0, 0), CallOutcome::kDone);
+    EXPECT_EQ(process->create(kTruth, 5), CallOutcome::kDone);
     return process;
   }
   static CallOutcome tell(FlightProcess& process, const ByteBuffer& message) {
@@ -59,7 +59,7 @@ TEST_F(FlightProcessTest, BootRecordArrives) {
   FlightProcessOptions o = options();
   o.config = "say this";
   FlightProcess process(o);
-  EXPECT_EQ(process.create(kTruth, 123, 4, 2), CallOutcome::kDone);
+  EXPECT_EQ(process.create(kTruth, 123, 4, ResetCause::kWatchdog), CallOutcome::kDone);
   ASSERT_EQ(process.output_count(), 5u);
   EXPECT_EQ(text_of(process.output(0).data), std::string("\4\0\0\0\2\0\0\0", 8));
   EXPECT_EQ(text_of(process.output(1).data), "dsc");
@@ -130,7 +130,7 @@ TEST_F(FlightProcessTest, StorageOutlivesTheProcess) {
   }
   FlightProcess next(o);
   next.set_storage(storage);
-  next.create(kTruth, 0, 1, 3);
+  next.create(kTruth, 0, 1, ResetCause::kCrash);
   tell(next, order("y\1"));
   EXPECT_THAT(said(next), ElementsAre("xyz"));
   tell(next, order("y\2"));
@@ -263,8 +263,8 @@ TEST_F(FlightProcessTest, StaticDestructorsLeaveNothingBehind) {
 TEST_F(FlightProcessTest, CallsOutOfTurnAreTheCallersMistake) {
   FlightProcess process(options());
   EXPECT_THROW(process.tick(kTruth, 0), std::logic_error);
-  process.create(kTruth, 0, 0, 0);
-  EXPECT_THROW(process.create(kTruth, 0, 0, 0), std::logic_error);
+  process.create(kTruth, 0);
+  EXPECT_THROW(process.create(kTruth, 0), std::logic_error);
   process.shut_down(kTruth, 0);
   EXPECT_THROW(process.tick(kTruth, 0), std::logic_error);
   EXPECT_THROW(process.shut_down(kTruth, 0), std::logic_error);
