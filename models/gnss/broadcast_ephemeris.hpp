@@ -6,6 +6,8 @@
 ///         and radians; the message's semicircles are converted with its own kGpsPi (lnav.hpp).
 #pragma once
 
+#include <orrery/harness/kernel/simulator_only.hpp>
+
 namespace orrery {
 
 /// The message's value of pi, IS-GPS-200 Table 20-IV. Using the true one moves a satellite by 0.8
