@@ -66,15 +66,10 @@ void ImpulsiveThruster::from_flight(DeviceContext& io, Bytes bytes) {
   io.after(delay, [this, &io, dv_ECI = command.dv_ECI] { burn(io, dv_ECI); });
 }
 
-void ImpulsiveThruster::reject(DeviceContext& io, const std::string& why) {
-  ++rejected_;
-  io.log(DeviceContext::kWarning, "thruster: command rejected: " + why);
-}
-
 void ImpulsiveThruster::burn(DeviceContext& io, const Vec3& dv_ECI) {
   const bool executed = io.fault("lost", 0.0) == 0.0;
   const double delivered_mps = executed ? norm(dv_ECI) : 0.0;
-  burn_log_.push_back({io.now(), dv_ECI, executed});
+  log_burn({io.now(), dv_ECI, executed});
   delta_v_mps_ += delivered_mps;
   if (executed) io.apply_impulse(dv_ECI);
   io.record("dv_mps", delivered_mps);

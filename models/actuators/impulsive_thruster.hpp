@@ -2,11 +2,7 @@
 /// burn.
 #pragma once
 
-#include <orrery/models/device/device.hpp>
-
-#include <cstdint>
-#include <string>
-#include <vector>
+#include <orrery/models/actuators/thruster.hpp>
 
 namespace orrery {
 
@@ -25,39 +21,24 @@ struct ImpulsiveThrusterOptions {
 ///           a component that is not finite, a delta-v above the maximum, a lead out of range.
 /// Fault     "lost": if it is not 0 at the burn, nothing happens, but the burn counts as due.
 /// Channel   "dv_mps": magnitude delivered at each burn, 0 if lost.
-class ImpulsiveThruster final : public Device {
+class ImpulsiveThruster final : public Thruster {
  public:
   using Options = ImpulsiveThrusterOptions;
-
-  struct Burn {
-    SimTime t;
-    Vec3 dv_ECI;           // commanded [m/s]
-    bool executed = true;  // false: lost
-  };
 
   /// @throws std::invalid_argument  an option outside its range.
   explicit ImpulsiveThruster(const Options& options = {});
 
-  std::string_view name() const override { return "thruster"; }
   void start(DeviceContext& io) override { (void)io; }
   void from_flight(DeviceContext& io, Bytes bytes) override;
 
-  /// Burns whose time has come, lost ones included.
-  int burns() const { return static_cast<int>(burn_log_.size()); }
-  const std::vector<Burn>& burn_log() const { return burn_log_; }
   /// Sum of |dv| over the burns that were executed.
   double delta_v_mps() const { return delta_v_mps_; }
-  /// Commands not accepted.
-  int rejected() const { return rejected_; }
 
  private:
-  void reject(DeviceContext& io, const std::string& why);
   void burn(DeviceContext& io, const Vec3& dv_ECI);
 
   Options options_;
-  std::vector<Burn> burn_log_;
   double delta_v_mps_ = 0;
-  int rejected_ = 0;
 };
 
 }  // namespace orrery

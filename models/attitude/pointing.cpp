@@ -1,6 +1,7 @@
 #include <orrery/models/attitude/pointing.hpp>
 #include <orrery/models/frames/rtn.hpp>
 
+#include <cmath>
 #include <stdexcept>
 
 namespace orrery {
@@ -26,6 +27,15 @@ BodyAttitude attitude_of(const Direction& x, const Direction& y, const Direction
 }
 
 }  // namespace
+
+Mat3 turned(const BodyAttitude& attitude, double dt_s) {
+  const double rate = norm(attitude.omega_BI_B);
+  if (rate == 0) return attitude.R_BI;
+  // What is fixed in inertial space turns backwards in body axes.
+  const double half = -0.5 * rate * dt_s;
+  const Vec3 v = std::sin(half) / rate * attitude.omega_BI_B;
+  return to_matrix({std::cos(half), v.x, v.y, v.z}) * attitude.R_BI;
+}
 
 BodyAttitude zenith_pointing(const InertialState& state) {
   const Mat3 R_HI = rtn_axes(state);

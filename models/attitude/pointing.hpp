@@ -11,6 +11,9 @@ struct BodyAttitude {
   Vec3 omega_BI_B;  // angular velocity of the body relative to ECI, in body axes [rad/s]
 };
 
+/// R_BI after dt_s more seconds at the same angular velocity.
+Mat3 turned(const BodyAttitude& attitude, double dt_s);
+
 /// Where the Sun is seen, and how that direction moves.
 struct SunDirection {
   Vec3 s_ECI;     // unit vector

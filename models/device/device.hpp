@@ -12,6 +12,7 @@
 #include <orrery/harness/kernel/time.hpp>
 #include <orrery/models/frames/vector.hpp>
 #include <orrery/models/orbit/force_model.hpp>
+#include <orrery/models/orbit/thrust.hpp>
 
 #include <string_view>
 
@@ -34,6 +35,8 @@ class DeviceContext {
   virtual Surroundings surroundings() const = 0;
   /// Attitude now: f_B = R_BI * f_ECI.
   virtual Mat3 R_BI() const = 0;
+  /// Angular velocity of the body relative to ECI now, in body axes [rad/s].
+  virtual Vec3 omega_BI_B() const = 0;
   /// The device's own stream (seed, spacecraft, device, purpose). Keep the reference if you like.
   virtual RandomStream& random(std::string_view purpose) = 0;
 
@@ -54,6 +57,9 @@ class DeviceContext {
   /// Changes this spacecraft's velocity by dv_ECI [m/s] at this instant. @throws std::domain_error
   /// not finite.
   virtual void apply_impulse(const Vec3& dv_ECI) = 0;
+  /// This device's thrust from this instant on, to the nanosecond; Thrust{} ends it. Those of
+  /// several devices add up. @throws std::invalid_argument  not finite, or a negative flow.
+  virtual void set_thrust(const Thrust& thrust) = 0;
 
   /// Adds a sample to the channel "<spacecraft>/<device>/<channel>".
   virtual void record(std::string_view channel, double value) = 0;

@@ -30,6 +30,10 @@ class FakeDeviceContext final : public DeviceContext {
     SimTime t;
     Vec3 dv_ECI;
   };
+  struct ThrustEdge {
+    SimTime t;
+    Thrust thrust;
+  };
   struct Sample {
     SimTime t;
     std::string channel;
@@ -47,6 +51,7 @@ class FakeDeviceContext final : public DeviceContext {
   std::function<OrbitState(SimTime)> truth_at = [](SimTime t) { return OrbitState{.t = t}; };
   std::function<Surroundings(SimTime)> surroundings_at = [](SimTime) { return Surroundings{}; };
   Mat3 attitude;
+  Vec3 body_rate_B;
   Duration clock_offset{};  // onboard minus truth
   std::map<std::string, double, std::less<>> faults;
 
@@ -54,6 +59,7 @@ class FakeDeviceContext final : public DeviceContext {
   std::vector<ToFlight> to_flight_log;
   std::vector<Transmission> transmissions;
   std::vector<Impulse> impulses;
+  std::vector<ThrustEdge> thrusts;
   std::vector<Sample> samples;
   std::vector<LogLine> log_lines;
 
@@ -83,6 +89,7 @@ class FakeDeviceContext final : public DeviceContext {
   OrbitState truth() const override { return truth_at(now_); }
   Surroundings surroundings() const override { return surroundings_at(now_); }
   Mat3 R_BI() const override { return attitude; }
+  Vec3 omega_BI_B() const override { return body_rate_B; }
   RandomStream& random(std::string_view purpose) override {
     return streams_.stream("chief", "device", purpose);
   }
@@ -110,6 +117,7 @@ class FakeDeviceContext final : public DeviceContext {
     transmissions.push_back({now_, std::string(to), ByteBuffer(frame.begin(), frame.end())});
   }
   void apply_impulse(const Vec3& dv_ECI) override { impulses.push_back({now_, dv_ECI}); }
+  void set_thrust(const Thrust& thrust) override { thrusts.push_back({now_, thrust}); }
   void record(std::string_view channel, double value) override {
     samples.push_back({now_, std::string(channel), value});
   }
