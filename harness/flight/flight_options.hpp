@@ -1,6 +1,7 @@
 /// How one flight process is loaded and what it is given.
 #pragma once
 
+#include <orrery/harness/heap/heap_options.hpp>
 #include <orrery/harness/kernel/time.hpp>
 
 #include <cstdint>
@@ -29,6 +30,7 @@ struct FlightProcessOptions {
   Isolation isolation = Isolation::kCopy;
   std::uint64_t heap_bytes = 64'000'000;  // cap, up to 4,293,918,720 (4 GiB less 1 MiB)
   int heap_alignment = 16;                // 16 (the host's ABI) or 8 (the paper's)
+  HeapRules heap = {};                    // policy, checks
   HeapExhaustion heap_exhaustion = HeapExhaustion::kNull;
   std::uint64_t storage_bytes = 1'048'576;  // non-volatile, all slots together
   Duration execution_time{0};               // of every call; outputs leave when it has passed

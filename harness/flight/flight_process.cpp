@@ -43,7 +43,9 @@ void check_heap(const FlightProcessOptions& options) {
 }
 
 HeapOptions heap_options(const FlightProcessOptions& options) {
-  return {.alignment = options.heap_alignment, .limit_bytes = options.heap_bytes};
+  return {.alignment = options.heap_alignment,
+          .limit_bytes = options.heap_bytes,
+          .rules = options.heap};
 }
 
 }  // namespace

@@ -103,6 +103,10 @@ const std::map<std::string, Setter>& setters() {
       {"break_at", [](Flags& f, std::string_view v) { f.break_at = parse_span("break_at", v); }},
       {"record", [](Flags& f, std::string_view v) { f.record = parse_record(v); }},
       {"log", [](Flags& f, std::string_view v) { f.log = parse_log(v); }},
+      {"verify_determinism",
+       [](Flags& f, std::string_view v) {
+         f.verify_determinism = parse_switch("verify_determinism", v);
+       }},
       {"progress", [](Flags& f, std::string_view v) { f.progress = parse_switch("progress", v); }},
   };
   return kSetters;
@@ -169,7 +173,8 @@ Flags parse_flags(const std::vector<std::string>& arguments,
       throw std::invalid_argument(argument + ": no such flag; known are " + known_flags());
     }
     const bool has_value = equals != std::string_view::npos;
-    if (!has_value && setter->first != "progress") {
+    const bool is_switch = setter->first == "progress" || setter->first == "verify_determinism";
+    if (!has_value && !is_switch) {
       throw std::invalid_argument(argument + ": needs a value, as in " + argument + "=VALUE");
     }
     setter->second(result, has_value ? rest.substr(equals + 1) : std::string_view());

@@ -32,7 +32,8 @@ struct Flags {
   std::optional<Duration> break_at = {};  // --orrery_break_at=SECONDS since the world's start
   RecordSetting record = {};              // --orrery_record=off|events|PERIOD (1s, 500ms, 10)
   LogSetting log = {};                    // --orrery_log=LEVEL[,SPACECRAFT]
-  bool progress = false;                  // --orrery_progress: progress and a result table
+  bool verify_determinism = false;  // --orrery_verify_determinism: run each test twice, compare
+  bool progress = false;            // --orrery_progress: progress and a result table
 };
 
 /// Reads and removes the --orrery_* flags. Call it before testing::InitGoogleTest, which evaluates

@@ -1,3 +1,4 @@
+#include <orrery/harness/gtest/determinism.hpp>
 #include <orrery/harness/gtest/listener.hpp>
 #include <orrery/harness/gtest/run_context.hpp>
 #include <orrery/harness/heap/interposition.hpp>
@@ -15,8 +16,13 @@ class Listener : public testing::EmptyTestEventListener {
   void OnTestStart(const testing::TestInfo& test) override {
     explained_ = false;
     set_current_test(std::string(test.test_suite_name()) + "." + test.name());
+    internal::begin_determinism_check();
   }
-  void OnTestEnd(const testing::TestInfo&) override { set_current_test({}); }
+  // Before GoogleTest's own printer, so that a failure that is added here is the test's.
+  void OnTestEnd(const testing::TestInfo& test) override {
+    internal::end_determinism_check(test);
+    set_current_test({});
+  }
 
   void OnTestPartResult(const testing::TestPartResult& result) override {
     if (!result.failed() || explained_) return;

@@ -34,7 +34,13 @@ class EventLoop::Running {
   ~Running() {
     if (loop_.in_fingerprint_) {
       loop_.last_.chain = loop_.fingerprint_.chain(event_.key.destination);
-      if (loop_.keep_log_) loop_.log_.push_back(loop_.last_);
+      if (loop_.keep_log_ && loop_.executed_ > loop_.log_from_ &&
+          loop_.executed_ <= loop_.log_until_) {
+        loop_.log_.push_back(loop_.last_);
+      }
+      if (loop_.keep_checkpoints_ && loop_.executed_ % kCheckpointEvents == 0) {
+        loop_.checkpoints_.push_back(loop_.fingerprint_.hash());
+      }
     }
     loop_.current_kind_ = nullptr;
   }

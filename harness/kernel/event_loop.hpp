@@ -6,6 +6,7 @@
 #include <orrery/harness/kernel/event_queue.hpp>
 #include <orrery/harness/kernel/fingerprint.hpp>
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -68,6 +69,16 @@ class EventLoop {
   /// From here on, keep every executed event (the recorder's excepted), so that two runs can be
   /// compared event by event.
   void keep_log(bool keep) { keep_log_ = keep; }
+  /// The same for the events of these numbers alone: from < number <= until.
+  void keep_log_of(std::uint64_t from, std::uint64_t until) {
+    keep_log_ = true;
+    log_from_ = from;
+    log_until_ = until;
+  }
+  /// From here on, note Fingerprint::hash() whenever this many events have been executed.
+  static constexpr std::uint64_t kCheckpointEvents = 4096;
+  void keep_checkpoints() { keep_checkpoints_ = true; }
+  const std::vector<std::uint64_t>& checkpoints() const { return checkpoints_; }
   const std::vector<EventRecord>& log() const { return log_; }
   /// Without the recorder's: the n-th event is the same one whatever is recorded.
   std::uint64_t events_executed() const { return executed_; }
@@ -99,6 +110,9 @@ class EventLoop {
   OwnerId current_owner_ = 0;
   bool in_fingerprint_ = false;  // the running event is
   bool keep_log_ = false;
+  bool keep_checkpoints_ = false;
+  std::vector<std::uint64_t> checkpoints_;
+  std::uint64_t log_from_ = 0, log_until_ = UINT64_MAX;
   std::uint64_t executed_ = 0;
 };
 

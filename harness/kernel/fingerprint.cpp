@@ -30,10 +30,14 @@ void Fingerprint::payload(OwnerId owner, Bytes bytes) {
   chains_[owner] = hash_bytes(chains_[owner], bytes);
 }
 
-std::string Fingerprint::value() const {
+std::uint64_t Fingerprint::hash() const {
   std::uint64_t h = hash_word(0, chains_.size());
   for (const std::uint64_t chain : chains_) h = hash_word(h, chain);
-  return hex_digits(h, 16);
+  return h;
+}
+
+std::string Fingerprint::value() const {
+  return hex_digits(hash(), 16);
 }
 
 std::optional<EventDifference> first_difference(const std::vector<EventRecord>& a,

@@ -28,7 +28,8 @@ class Fingerprint {
   /// Mixes the length and the bytes.
   void payload(OwnerId owner, Bytes bytes);
   std::uint64_t chain(OwnerId owner) const { return chains_[owner]; }
-  /// The run's value: a hash over the chains in owner order, 16 hex digits.
+  /// The run's value: a hash over the chains in owner order, 16 hex digits as text.
+  std::uint64_t hash() const;
   std::string value() const;
 
  private:

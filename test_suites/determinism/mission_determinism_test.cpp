@@ -102,6 +102,14 @@ TEST_F(MissionDeterminismTest, RecordingLogsAndEnvironmentChangeNoFingerprint) {
   EXPECT_NE(fingerprint_of(run(mission("--orrery_seed=2"))), plain);
 }
 
+// Again as a child, with scattered heaps, other addresses, another environment, recorded and
+// logged.
+TEST_F(MissionDeterminismTest, TheMissionVerifiesItself) {
+  const Outcome outcome = run(mission("--orrery_verify_determinism"));
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.text;
+  EXPECT_EQ(fingerprint_of(outcome), fingerprint_of(run(mission(""))));
+}
+
 // The kernel places stack, heap and libraries anew for each of these runs unless it is told not to.
 TEST_F(MissionDeterminismTest, AddressesChangeNoFingerprint) {
   const std::string anywhere = fingerprint_of(run(mission("")));

@@ -1,0 +1,32 @@
+/// This test program once more, as a child process.
+#pragma once
+
+#include <orrery/harness/kernel/simulator_only.hpp>
+
+#include <string>
+#include <vector>
+
+namespace orrery {
+
+struct ChildCommand {
+  std::vector<std::string> arguments;    // without the program's name
+  std::vector<std::string> environment;  // "NAME=value", added to this one's
+  std::vector<std::string> removed;      // names; all GTEST_* go in any case
+  /// With address randomisation where this process has none, and without where it has.
+  bool other_addresses = false;
+};
+
+struct ChildOutcome {
+  int exit_code = -1;  // -1: ended by a signal
+  int signal = 0;
+  std::string tail;  // of what it printed on stdout and stderr, at most 4 kB
+
+  bool passed() const { return exit_code == 0; }
+  std::string describe() const;  // "ended with exit code 1", "was ended by signal 11"
+};
+
+/// Starts /proc/self/exe and waits for it. It dies with this process.
+/// @throws std::runtime_error  it cannot be started.
+ChildOutcome run_child(const ChildCommand& command);
+
+}  // namespace orrery
