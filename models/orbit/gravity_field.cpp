@@ -1,9 +1,11 @@
 #include <orrery/models/data/embedded_tables.hpp>
 #include <orrery/models/orbit/gravity_field.hpp>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
@@ -13,6 +15,9 @@ namespace {
 
 constexpr int kHighestDegree = 360;  // scale factors of HarmonicGravity stay far inside double
 constexpr std::string_view kBlanks = " \t\r";
+// Beyond what any body has: the Sun's mu is 1.3e20 m^3/s^2, its radius 7e8 m.
+constexpr double kLargestMu_m3ps2 = 1e22, kLargestRadius_m = 1e10;
+constexpr double kLargestCoefficient = 1;
 
 std::size_t triangle_index(int n, int m) {
   return static_cast<std::size_t>(n) * (static_cast<std::size_t>(n) + 1) / 2 +
@@ -48,6 +53,27 @@ std::optional<double> real_in(std::string_view word) {
   return value && std::isfinite(*value) ? value : std::nullopt;
 }
 
+// A word for a message, which need not be readable or short in a damaged file.
+std::string quoted(std::string_view word) {
+  constexpr std::size_t kLongest = 40;
+  std::string text = "'";
+  for (const char c : word.substr(0, kLongest)) text += c >= ' ' && c <= '~' ? c : '?';
+  return text + (word.size() > kLongest ? "...'" : "'");
+}
+
+std::string in_short(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
+}
+
+bool is_text(std::string_view line) {
+  return std::none_of(line.begin(), line.end(), [](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    return (byte < ' ' && c != '\t' && c != '\r') || byte == 0x7f;
+  });
+}
+
 }  // namespace
 
 /// Reads a field line by line; knows where it is, for the messages.
@@ -77,6 +103,7 @@ class GravityFieldReader {
     if (end == std::string_view::npos) fail("cut short: the last line has no line end");
     line = text_.substr(0, end);
     text_.remove_prefix(end + 1);
+    if (!is_text(line)) fail("not text");
     return true;
   }
 
@@ -94,17 +121,18 @@ class GravityFieldReader {
     if (keyword == "modelname") field_.name_ = value;
     if (keyword == "tide_system") field_.tide_system_ = value;
     if (keyword == "earth_gravity_constant" || keyword == "gravity_constant")
-      field_.mu_m3ps2_ = positive(keyword, value);
-    if (keyword == "radius") field_.radius_m_ = positive(keyword, value);
+      field_.mu_m3ps2_ = positive(keyword, value, kLargestMu_m3ps2);
+    if (keyword == "radius") field_.radius_m_ = positive(keyword, value, kLargestRadius_m);
     if (keyword == "max_degree") announced_degree_ = number_in<int>(value).value_or(-1);
     if (keyword == "norm" && value != "fully_normalized")
-      fail("norm is '" + std::string(value) + "'; accepted: fully_normalized");
+      fail("norm is " + quoted(value) + "; accepted: fully_normalized");
   }
 
-  double positive(std::string_view keyword, std::string_view value) const {
+  double positive(std::string_view keyword, std::string_view value, double largest) const {
     const std::optional<double> number = real_in(value);
-    if (!number || *number <= 0)
-      fail(std::string(keyword) + " is '" + std::string(value) + "'; accepted: a positive number");
+    if (!number || !(*number > 0) || *number > largest)
+      fail(std::string(keyword) + " is " + quoted(value) + "; accepted: a positive number up to " +
+           in_short(largest));
     return *number;
   }
 
@@ -129,7 +157,7 @@ class GravityFieldReader {
       const std::string_view key = take_word(line);
       if (key.empty()) continue;
       if (key != "gfc")
-        fail("'" + std::string(key) + "' is not a line of a static field; accepted: gfc n m C S");
+        fail(quoted(key) + " is not a line of a static field; accepted: gfc n m C S");
       read_coefficient(line);
     }
   }
@@ -147,6 +175,9 @@ class GravityFieldReader {
       fail("degree " + std::to_string(*n) +
            " must be C = 1 (degree 0) or 0 (degree 1): mu is the header's, the origin the centre "
            "of mass");
+    if (std::abs(*C) > kLargestCoefficient || std::abs(*S) > kLargestCoefficient)
+      fail("C = " + in_short(*C) + ", S = " + in_short(*S) +
+           "; accepted: fully normalised coefficients, -1 to 1");
     if (*n <= field_.degree_) store(*n, *m, *C, *S);
   }
 

@@ -19,8 +19,9 @@ namespace orrery {
 ///          Degree 0 and 1 may be left out; they are 1 and 0.
 /// Errors   Everything that does not read as a complete field throws std::invalid_argument with the
 ///          source's name and the line: a file cut short, a missing, repeated, malformed or
-///          non-finite coefficient, an unnormalised or time-variable field.
-/// Checked  test_suites/unit/models/orbit/gravity_field_test.cpp
+///          non-finite or implausibly large coefficient, an unnormalised or time-variable field,
+///          something that is not text.
+/// Checked  test_suites/unit/models/orbit/gravity_field_test.cpp, test_suites/fuzz
 class GravityField {
  public:
   /// GGM05S to 60x60, zero tide, compiled in (models/data). Ries et al. 2016.

@@ -94,6 +94,13 @@ TEST(GravityFieldTest, MalformedContentNamesTheLine) {
   expect_refused(field("gfc 2 0 -4.8x 0\n" + rest), "line 5", "malformed");
   expect_refused(field("gfc 2 0 nan 0\n" + rest), "line 5", "finite");
   expect_refused(field("gfc 2 0 inf 0\n" + rest), "line 5", "finite");
+  expect_refused(field("gfc 2 0 -4.8e-4 1e999\n" + rest), "line 5", "finite");
+  expect_refused(field("gfc 2 0 -4.8e4 0\n" + rest), "line 5", "-1 to 1");
+  expect_refused(field("gfc 2 0 -4.8e-4 -1e300\n" + rest), "line 5", "-1 to 1");
+  expect_refused(field("gfc 99999999999 0 0 0\n" + rest), "line 5", "malformed");
+  expect_refused(field("gfc -1 0 0 0\n" + rest), "line 5", "no such coefficient");
+  expect_refused(field("gfc 2 0 -4.8e-4 0\n" + rest + "gfc 2 0 " + std::string("\0\1", 2) + " 0\n"),
+                 "line 8", "not text");
   expect_refused(field("gfc 2.0 0 -4.8e-4 0\n" + rest), "line 5", "malformed");
   expect_refused(field("gfc 2 0 -4.8e-4 0\ngfc 2 1 0 0\ngfc 2 1 0 0\n"), "line 7", "given twice");
   expect_refused(field("gfc 3 0 0 0\n" + rest), "line 5", "no such coefficient");
@@ -109,6 +116,17 @@ TEST(GravityFieldTest, HeaderMustSayWhatTheCoefficientsMean) {
   expect_refused("earth_gravity_constant 1\nmax_degree 2\nend_of_head\n", "line 3", "radius");
   expect_refused("earth_gravity_constant 1\nradius 1\nend_of_head\n", "line 3", "max_degree");
   expect_refused("earth_gravity_constant 1\nradius -1\n", "line 2", "positive");
+  expect_refused("radius nan\n", "line 1", "positive");
+  expect_refused("radius 1e300\n", "line 1", "positive number up to");
+  expect_refused("earth_gravity_constant 1e23\n", "line 1", "positive number up to");
+  expect_refused("earth_gravity_constant 1\nradius 1\nmax_degree 2000000000\nend_of_head\n",
+                 "line 4", "accepted: 2 to 360");
+  expect_refused("earth_gravity_constant 1\nradius 1\nmax_degree 1e9\nend_of_head\n", "line 4",
+                 "max_degree");
+  expect_refused(std::string("\x7f"
+                             "ELF\2\1\0\0\n\0\0\n",
+                             12),
+                 "line 1", "not text");
   expect_refused("norm unnormalized\n", "line 1", "fully_normalized");
   expect_refused("radius 1\n", "line 1", "end_of_head");
   expect_refused("", "line 0", "end_of_head");

@@ -23,21 +23,33 @@ TEST(SunMoonTest, SeriesGiveTheCheckValues) {
   EXPECT_LT(norm(moon - Vec3{2.277137e8, -2.655760e8, -1.440947e8}), 1e2);
 }
 
-// Gate for forces: 0.12 deg against eraEpv00 and eraMoon98.
+// Gate for forces: 0.12 deg against eraEpv00 and eraMoon98, from 2016 into 2030. Observed, over
+// 2024-2029 too: Sun 0.099 deg, Moon OBSERVED deg. The Sun's is nearly all of one sign: the series
+// refers to an equinox that the figures of its mean longitude place a little off J2000.
 TEST(SunMoonTest, SeriesStayNearTheEphemerides) {
-  for (int k = 0; k < 200; ++k) {
-    const SimTime t(days(13200) + k * 625h);
+  double sun_deg = 0, moon_deg = 0, sun_distance = 0, moon_distance = 0;
+  for (SimTime t(days(13200)); t < gps_midnight(2030, 1, 1); t += 61h) {
     const JulianDate tt = gps_to_tt(t);
     double earth[2][3], barycentric[2][3], moon[2][3];
     eraEpv00(tt.day, tt.fraction, earth, barycentric);
     eraMoon98(tt.day, tt.fraction, moon);
     const Vec3 sun_au{-earth[0][0], -earth[0][1], -earth[0][2]};
     const Vec3 moon_au{moon[0][0], moon[0][1], moon[0][2]};
-    EXPECT_LT(angle_between_rad(sun_position_ECI(t), sun_au) * ERFA_DR2D, 0.12);
-    EXPECT_LT(angle_between_rad(moon_position_ECI(t), moon_au) * ERFA_DR2D, 0.12);
-    EXPECT_NEAR(norm(sun_position_ECI(t)) / (norm(sun_au) * ERFA_DAU), 1, 2e-4);
-    EXPECT_NEAR(norm(moon_position_ECI(t)) / (norm(moon_au) * ERFA_DAU), 1, 3e-3);
+    const Vec3 r_sun = sun_position_ECI(t), r_moon = moon_position_ECI(t);
+    sun_deg = std::max(sun_deg, angle_between_rad(r_sun, sun_au) * ERFA_DR2D);
+    moon_deg = std::max(moon_deg, angle_between_rad(r_moon, moon_au) * ERFA_DR2D);
+    sun_distance = std::max(sun_distance, std::abs(norm(r_sun) / (norm(sun_au) * ERFA_DAU) - 1));
+    moon_distance =
+        std::max(moon_distance, std::abs(norm(r_moon) / (norm(moon_au) * ERFA_DAU) - 1));
   }
+  RecordProperty("largest_sun_error_deg", std::to_string(sun_deg));
+  RecordProperty("largest_moon_error_deg", std::to_string(moon_deg));
+  RecordProperty("largest_sun_distance_error_1e_6", std::to_string(1e6 * sun_distance));
+  RecordProperty("largest_moon_distance_error_1e_6", std::to_string(1e6 * moon_distance));
+  EXPECT_LT(sun_deg, 0.12);
+  EXPECT_LT(moon_deg, 0.12);
+  EXPECT_LT(sun_distance, 2e-4);
+  EXPECT_LT(moon_distance, 3e-3);
 }
 
 // The equinox of 2025-03-20 is published as 09:01 UTC, when the apparent right ascension in the
