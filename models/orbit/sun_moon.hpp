@@ -7,8 +7,8 @@
 namespace orrery {
 
 // Short series for forces: Montenbruck & Gill, Satellite Orbits (2000), 3.3.2; geocentric,
-// geometric, ECI [m]. Within 0.12 deg of the ephemerides over 2016-2030 (Sun 6e-3 %, Moon 0.13 % in
-// distance): not for pointing.
+// geometric, ECI [m]. Within 0.12 deg of the ephemerides over 2016-2029 (Sun 8e-3 %, Moon 0.13 % in
+// distance): not for pointing. The Sun's error, 0.1 deg in 2029, grows by 0.0032 deg a year.
 Vec3 sun_position_ECI(SimTime t);
 Vec3 moon_position_ECI(SimTime t);
 
