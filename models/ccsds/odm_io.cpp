@@ -7,9 +7,7 @@
 
 namespace orrery {
 namespace ccsds {
-namespace {
 
-// Capitals, with one blank where there are blanks, dashes or underscores.
 std::string canonical(std::string_view name) {
   std::string text;
   for (const char c : name) {
@@ -19,6 +17,8 @@ std::string canonical(std::string_view name) {
   }
   return text;
 }
+
+namespace {
 
 template <class Names>
 bool contains(const Names& names, std::string_view name) {
@@ -41,14 +41,6 @@ bool is_centre(std::string_view name) {
 
 bool all_digits(std::string_view text) {
   return std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
-}
-
-// ITRF, ITRF2014, ITRF-97.
-bool is_itrf(std::string_view canonical_name) {
-  if (!canonical_name.starts_with("ITRF")) return false;
-  std::string_view year = canonical_name.substr(4);
-  if (year.starts_with(' ')) year.remove_prefix(1);
-  return (year.empty() || year.size() == 2 || year.size() == 4) && all_digits(year);
 }
 
 bool is_orbit_frame(std::string_view name) {
@@ -97,6 +89,13 @@ TimeSystem time_system(const KvnLines& lines, const KvnLine& line) {
 }
 
 }  // namespace
+
+bool is_itrf(std::string_view canonical_name) {
+  if (!canonical_name.starts_with("ITRF")) return false;
+  std::string_view year = canonical_name.substr(4);
+  if (year.starts_with(' ')) year.remove_prefix(1);
+  return (year.empty() || year.size() == 2 || year.size() == 4) && all_digits(year);
+}
 
 OdmHeader read_header(KvnLines& lines, std::string_view version_keyword) {
   OdmHeader header;

@@ -31,6 +31,12 @@ class KeywordsSeen {
   std::vector<std::string_view> seen_;
 };
 
+/// Names of frames and centres: capitals, with one blank where there are blanks, dashes or
+/// underscores.
+std::string canonical(std::string_view name);
+/// ITRF, ITRF2014, ITRF-97, as canonical() gives them.
+bool is_itrf(std::string_view canonical_name);
+
 /// @throws std::invalid_argument  it cannot be read.
 std::string read_file(const std::string& path, const char* reader);
 
