@@ -29,8 +29,10 @@ inline SimTime from_week(int week, double seconds) {
 constexpr int week_of(SimTime t) {
   return static_cast<int>(t.time_since_epoch() / kWeek);
 }
+/// Whole seconds are exact.
 constexpr double second_of_week(SimTime t) {
-  return to_seconds(t.time_since_epoch() % kWeek);
+  const Duration of_week = t.time_since_epoch() % kWeek;
+  return static_cast<double>(of_week / 1s) + to_seconds(of_week % 1s);
 }
 
 }  // namespace orrery::gps
