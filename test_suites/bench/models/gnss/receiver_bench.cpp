@@ -36,6 +36,7 @@ class BenchContext final : public DeviceContext {
     return {.omega_EI_ECEF = {0, 0, 7.292e-5}, .r_sun_ECI = {1.5e11, 0, 0}};
   }
   Mat3 R_BI() const override { return R_BI_; }
+  Vec3 omega_BI_B() const override { return {0, 1.0951e-3, 0}; }
   RandomStream& random(std::string_view purpose) override {
     return streams_.stream("chief", "gnss", purpose);
   }
@@ -51,6 +52,7 @@ class BenchContext final : public DeviceContext {
   void to_flight(Bytes bytes) override { bytes_ += bytes.size(); }
   void transmit(std::string_view, Bytes) override {}
   void apply_impulse(const Vec3&) override {}
+  void set_thrust(const Thrust&) override {}
   void record(std::string_view, double) override {}
   void log(int, std::string_view) override {}
   double fault(std::string_view, double nominal) const override { return nominal; }
