@@ -69,6 +69,26 @@ TEST(ElementsTest, KeplerianDetourKeepsTheElements) {
   EXPECT_NEAR(back.mean_anomaly_rad, k.mean_anomaly_rad, 1e-13);
 }
 
+// Over Cartesian coordinates, e and i away from their singularities: perigee is known to the
+// rounding of e divided by it.
+TEST(ElementsTest, CartesianDetourKeepsKeplerianElements) {
+  for (const double e : {1e-3, 0.2, 0.7}) {
+    for (double angle = 0.1; angle < 2 * kPi; angle += 0.7) {
+      const KeplerianElements k{
+          2.4e7, e, 0.4 + 0.3 * angle, angle, wrap_to_two_pi(2 * angle), wrap_to_two_pi(3 * angle)};
+      const KeplerianElements back = to_keplerian(to_inertial(k));
+      const double tolerance = 2e-14 / ((1 - e) * (1 - e));
+      EXPECT_NEAR(back.a_m / k.a_m, 1, tolerance);
+      EXPECT_NEAR(back.e, k.e, tolerance);
+      EXPECT_NEAR(back.i_rad, k.i_rad, tolerance);
+      EXPECT_NEAR(wrap_to_pi(back.raan_rad - k.raan_rad), 0, 10 * tolerance);
+      EXPECT_NEAR(wrap_to_pi(back.argument_of_perigee_rad - k.argument_of_perigee_rad), 0,
+                  10 * tolerance / e);
+      EXPECT_NEAR(wrap_to_pi(back.mean_anomaly_rad - k.mean_anomaly_rad), 0, 10 * tolerance / e);
+    }
+  }
+}
+
 TEST(ElementsTest, KeplersEquationHoldsEverywhere) {
   for (const double e : {0.0, 0.001, 0.5, 0.95}) {
     for (double u = -20; u < 20; u += 0.37) {
