@@ -4,8 +4,10 @@ include(CMakePackageConfigHelpers)
 set(orrery_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/orrery)
 
 get_property(orrery_installed_targets GLOBAL PROPERTY ORRERY_INSTALLED_TARGETS)
+get_property(orrery_installed_programs GLOBAL PROPERTY ORRERY_INSTALLED_PROGRAMS)
 # What `cmake --install` needs, without tests and benchmarks.
-add_custom_target(orrery_package DEPENDS ${orrery_installed_targets})
+add_custom_target(orrery_package DEPENDS ${orrery_installed_targets} ${orrery_installed_programs})
+install(TARGETS ${orrery_installed_programs} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(TARGETS ${orrery_installed_targets} EXPORT orreryTargets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
   OBJECTS DESTINATION ${CMAKE_INSTALL_LIBDIR}/orrery

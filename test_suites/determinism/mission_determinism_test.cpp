@@ -1,15 +1,16 @@
 // The reference mission (MISSION_PROGRAM) is run as a child under conditions that must not matter.
+#include <orrery/harness/record/folder_comparison.hpp>
+
 #include <gtest/gtest.h>
 
 #include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <map>
 #include <string>
 #include <sys/wait.h>
+
+using namespace orrery;
 
 namespace {
 
@@ -60,33 +61,8 @@ class MissionDeterminismTest : public testing::Test {
   std::string out(const std::string& name) const {
     return "--orrery_out=" + (folder_ / name).string();
   }
-  std::map<std::string, std::string> files(const std::string& name) const {
-    std::map<std::string, std::string> contents;
-    for (const auto& entry : fs::recursive_directory_iterator(folder_ / name)) {
-      if (!entry.is_regular_file()) continue;
-      std::ifstream file(entry.path(), std::ios::binary);
-      contents[entry.path().lexically_relative(folder_ / name).string()] =
-          std::string(std::istreambuf_iterator<char>(file), {});
-    }
-    return contents;
-  }
-
   fs::path folder_;
 };
-
-/// The lines of summary.json that may differ between equal runs are those of host times.
-std::string without_host_times(const std::string& json) {
-  std::string kept;
-  for (std::size_t at = 0; at < json.size();) {
-    const std::size_t end = std::min(json.find('\n', at), json.size() - 1) + 1;
-    const std::string line = json.substr(at, end - at);
-    const bool is_host_time = line.find("wall_s\"") != std::string::npos ||
-                              line.find("\"x_real_time\"") != std::string::npos;
-    if (!is_host_time) kept += line;
-    at = end;
-  }
-  return kept;
-}
 
 }  // namespace
 
@@ -123,16 +99,14 @@ TEST_F(MissionDeterminismTest, AddressesChangeNoFingerprint) {
 TEST_F(MissionDeterminismTest, EqualRunsWriteEqualFiles) {
   ASSERT_EQ(run(mission(out("a"))).exit_code, 0);
   ASSERT_EQ(run(mission(out("b"))).exit_code, 0);
-  const auto a = files("a"), b = files("b");
-  ASSERT_GE(a.size(), 9u);  // truth, links and GNSS of both, and the summary
-  ASSERT_EQ(a.size(), b.size());
-  for (const auto& [name, content] : a) {
-    ASSERT_EQ(b.count(name), 1u) << name;
-    EXPECT_FALSE(content.empty()) << name;
-    if (name.find("summary.json") != std::string::npos) {
-      EXPECT_EQ(without_host_times(b.at(name)), without_host_times(content));
-    } else {
-      EXPECT_TRUE(b.at(name) == content) << name;  // megabytes: do not print them
-    }
+  int written = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(folder_ / "a")) {
+    if (!entry.is_regular_file()) continue;
+    ++written;
+    EXPECT_GT(entry.file_size(), 0u) << entry.path();
+  }
+  EXPECT_GE(written, 9);  // truth, links and GNSS of both, and the summary
+  for (const FileDifference& difference : compare_folders(folder_ / "a", folder_ / "b")) {
+    ADD_FAILURE() << difference.file << ": " << difference.text;
   }
 }
