@@ -17,7 +17,6 @@
 #include "../../accuracy.hpp"
 #include "../frames/reference_file.hpp"
 #include "orbit_fit.hpp"
-#include "real_earth.hpp"
 
 namespace orrery {
 namespace {
@@ -64,7 +63,8 @@ struct SentinelValidation : testing::Test {
     if (!sp3_text || !eop_text || !weather_text) return;
     data = std::make_unique<Data>(
         Data{parse_sp3(*sp3_text, "sentinel3a", {.excerpt = true}).satellite("L74").records,
-             std::make_shared<const RealEarth>(EarthOrientationTable::parse(*eop_text, "EOP-All")),
+             std::make_shared<const EarthEnvironment>(
+                 EarthOrientationTable::parse(*eop_text, "EOP-All")),
              std::make_shared<const Nrlmsise00Atmosphere>(Nrlmsise00AtmosphereOptions{
                  .weather = SpaceWeather::parse_celestrak(*weather_text, "SW-All")})});
   }
@@ -212,16 +212,6 @@ TEST_F(SentinelValidation, MostOfWhatIsLeftIsTheTideOfTheSolidEarth) {
   const Fit with_tide = fit({after_begin(0h), 24h, 20s, 60, true}, true);
   RecordProperty("rms_with_tide_m", short_number(with_tide.rms_m));
   EXPECT_LT(with_tide.rms_m, 0.5);
-}
-
-// The test's own attitude of the Earth, with all parameters zero, is the project's: rounding of a
-// dozen rotations.
-TEST(RealEarthTest, IsTheModelWithoutATable) {
-  const SimTime t = gps_midnight(2018, 12, 25) + 4321s;
-  const Mat3 ours = RealEarth(EarthOrientationTable::none()).surroundings(t).R_EI;
-  const Mat3 exact = EarthOrientation::exact_R_EI(t);
-  for (const Vec3 e : {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}})
-    EXPECT_LT(norm(ours * e - exact * e), 1e-14);
 }
 
 }  // namespace
