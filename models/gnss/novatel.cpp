@@ -145,12 +145,6 @@ void Frame::close() {
   Writer(out_->data() + crc_at).u32(crc32(Bytes(*out_).subspan(start_, crc_at - start_)));
 }
 
-std::array<std::byte, kBestXyzBytes> encode(const BestXyz& message) {
-  std::array<std::byte, kBestXyzBytes> body;
-  put(message, Writer(body.data()));
-  return body;
-}
-
 void append_frame(const Header& header, Bytes body, ByteBuffer& out) {
   Frame frame(header, header.message_id, body.size(), out);
   frame.body().bytes(body);

@@ -69,8 +69,6 @@ struct BestXyz {
 /// starts from all ones and inverts). `crc` continues an earlier call.
 std::uint32_t crc32(Bytes bytes, std::uint32_t crc = 0);
 
-std::array<std::byte, kBestXyzBytes> encode(const BestXyz& message);
-
 /// Appends header, body and CRC to `out`. Allocates only if `out` has to grow.
 /// @throws std::invalid_argument  `header.t` before the GPS epoch; a body above 65535 bytes.
 void append_frame(const Header& header, Bytes body, ByteBuffer& out);

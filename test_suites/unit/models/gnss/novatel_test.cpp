@@ -5,10 +5,6 @@
 
 #include <bit>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <sstream>
 #include <string>
 
 namespace orrery::novatel {
@@ -54,14 +50,6 @@ T field(Bytes bytes, std::size_t offset) {
   return value;
 }
 
-Vec3 f64x3(Bytes b, std::size_t at) {
-  return {field<double>(b, at), field<double>(b, at + 8), field<double>(b, at + 16)};
-}
-
-Vec3 f32x3(Bytes b, std::size_t at) {
-  return {field<float>(b, at), field<float>(b, at + 4), field<float>(b, at + 8)};
-}
-
 // CRC-32 catalogue, https://reveng.sourceforge.io/crc-catalogue: the check word of this polynomial
 // with initial value 0 and no inversion; the widespread variants give 0xCBF43926 and 0x340BC6D9.
 TEST(NovatelCrcTest, CheckWordIsThatOfTheUninvertedVariant) {
@@ -103,7 +91,7 @@ TEST(NovatelFrameTest, BestXyzMatchesTheFrameWrittenByHand) {
                         .galileo_beidou_mask = 0x11,
                         .gps_glonass_mask = 0x01};
   ByteBuffer frame;
-  append_frame({.message_id = kBestXyzId, .t = t}, encode(message), frame);
+  append({.t = t}, message, frame);
 
   ByteBuffer expected = from_hex(
       "aa4412 1c f100 00 20 7000 0000 64 b4 3609 10979914 00000000 0000 803e "  // header
@@ -162,131 +150,6 @@ TEST(NovatelFrameTest, BodyBeyondTheLengthFieldIsRefused) {
   EXPECT_THAT([&] { append_frame({.message_id = 1, .t = from_ns(0)}, body, frame); },
               testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("65536 bytes")));
 }
-
-// Logs of real receivers: GAVLab/novatel test data (see novatel/README.md of the reference data).
-class NovatelSampleTest : public testing::TestWithParam<const char*> {
- protected:
-  void SetUp() override {
-    const std::filesystem::path folder = std::filesystem::path(ORRERY_REFERENCE_DATA) / "novatel";
-    if (!std::filesystem::exists(folder)) {
-      GTEST_SKIP() << "no NovAtel logs in " << folder << " (ORRERY_REFERENCE_DATA)";
-    }
-    binary_ = read(folder / (std::string(GetParam()) + ".GPS"));
-    ascii_ = read(folder / (std::string(GetParam()) + ".ASC"));
-  }
-
-  static std::string read(const std::filesystem::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    EXPECT_TRUE(file) << path;
-    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  }
-
-  // Every BESTXYZ frame of the binary log, CRC included.
-  std::vector<Bytes> binary_frames() const {
-    std::vector<Bytes> frames;
-    const Bytes log = bytes_of(binary_);
-    for (std::size_t at = binary_.find("\xAA\x44\x12"); at != std::string::npos;
-         at = binary_.find("\xAA\x44\x12", at + 1)) {
-      if (log.size() - at < 28 || field<std::uint16_t>(log, at + 4) != 241) continue;
-      frames.push_back(log.subspan(at, 28u + field<std::uint16_t>(log, at + 8) + 4));
-    }
-    return frames;
-  }
-
-  // Fields of every #BESTXYZA line, header and body split at the commas.
-  std::vector<std::vector<std::string>> ascii_lines() const {
-    std::vector<std::vector<std::string>> lines;
-    std::istringstream log(ascii_);
-    for (std::string line; std::getline(log, line);) {
-      if (line.rfind("#BESTXYZA", 0) != 0) continue;
-      for (char& c : line) c = c == ';' || c == '*' ? ',' : c;
-      std::istringstream fields(line);
-      lines.emplace_back();
-      for (std::string text; std::getline(fields, text, ',');) lines.back().push_back(text);
-    }
-    return lines;
-  }
-
-  std::string binary_, ascii_;
-};
-
-// A header and a body filled from the receiver's own fields must give back the receiver's own
-// bytes, its CRC included.
-TEST_P(NovatelSampleTest, EncodingARealReceiversFieldsGivesItsBytes) {
-  const std::vector<Bytes> frames = binary_frames();
-  ASSERT_FALSE(frames.empty());
-  for (const Bytes sample : frames) {
-    const Bytes body = sample.subspan(28);
-    const std::int64_t ms =
-        field<std::uint16_t>(sample, 14) * 604'800'000LL + field<std::uint32_t>(sample, 16);
-    const Header header{.message_id = field<std::uint16_t>(sample, 4),
-                        .t = from_ns(ms * 1'000'000),
-                        .message_type = field<std::uint8_t>(sample, 6),
-                        .port_address = field<std::uint8_t>(sample, 7),
-                        .sequence = field<std::uint16_t>(sample, 10),
-                        .idle_time_half_percent = field<std::uint8_t>(sample, 12),
-                        .time_status = TimeStatus{field<std::uint8_t>(sample, 13)},
-                        .receiver_status = field<std::uint32_t>(sample, 20),
-                        .reserved = field<std::uint16_t>(sample, 24),
-                        .software_build = field<std::uint16_t>(sample, 26)};
-    BestXyz message{.position_status = SolutionStatus{field<std::uint32_t>(body, 0)},
-                    .position_type = SolutionType{field<std::uint32_t>(body, 4)},
-                    .r_ECEF = f64x3(body, 8),
-                    .sigma_r_ECEF = f32x3(body, 32),
-                    .velocity_status = SolutionStatus{field<std::uint32_t>(body, 44)},
-                    .velocity_type = SolutionType{field<std::uint32_t>(body, 48)},
-                    .v_ECEF = f64x3(body, 52),
-                    .sigma_v_ECEF = f32x3(body, 76),
-                    .velocity_latency_s = field<float>(body, 92),
-                    .differential_age_s = field<float>(body, 96),
-                    .solution_age_s = field<float>(body, 100),
-                    .satellites_tracked = field<std::uint8_t>(body, 104),
-                    .satellites_used = field<std::uint8_t>(body, 105),
-                    .satellites_used_L1 = field<std::uint8_t>(body, 106),
-                    .satellites_used_multi_frequency = field<std::uint8_t>(body, 107),
-                    .extended_solution_status = field<std::uint8_t>(body, 109),
-                    .galileo_beidou_mask = field<std::uint8_t>(body, 110),
-                    .gps_glonass_mask = field<std::uint8_t>(body, 111)};
-    std::memcpy(message.station_id.data(), body.data() + 88, 4);
-
-    ByteBuffer frame;
-    append_frame(header, encode(message), frame);
-    EXPECT_EQ(frame, ByteBuffer(sample.begin(), sample.end()));
-  }
-}
-
-// The ASCII twin of each log names what the fields mean; its decimals are rounded to 0.1 mm.
-TEST_P(NovatelSampleTest, LayoutOfTheBinaryLogMeansWhatItsAsciiTwinSays) {
-  const std::vector<Bytes> frames = binary_frames();
-  const std::vector<std::vector<std::string>> lines = ascii_lines();
-  ASSERT_EQ(frames.size(), lines.size());
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    const std::vector<std::string>& text = lines[i];
-    const Bytes body = frames[i].subspan(28);
-    EXPECT_EQ(text[4], "FINESTEERING");
-    EXPECT_EQ(field<TimeStatus>(frames[i], 13), TimeStatus::kFineSteering);
-    EXPECT_EQ(std::to_string(field<std::uint16_t>(frames[i], 14)), text[5]);
-    EXPECT_DOUBLE_EQ(1e-3 * field<std::uint32_t>(frames[i], 16), std::stod(text[6]));
-    EXPECT_EQ(text[10], "SOL_COMPUTED");
-    EXPECT_EQ(field<SolutionStatus>(body, 0), SolutionStatus::kComputed);
-    EXPECT_EQ(text[11], "SINGLE");
-    EXPECT_EQ(field<SolutionType>(body, 4), SolutionType::kSingle);
-    EXPECT_EQ(text[19], "DOPPLER_VELOCITY");
-    EXPECT_EQ(field<SolutionType>(body, 48), SolutionType::kDopplerVelocity);
-    for (int axis = 0; axis < 3; ++axis) {
-      constexpr double kRounding = 0.51e-4;
-      EXPECT_NEAR(f64x3(body, 8)[axis], std::stod(text[12 + axis]), kRounding);
-      EXPECT_NEAR(f32x3(body, 32)[axis], std::stod(text[15 + axis]), kRounding);
-      EXPECT_NEAR(f64x3(body, 52)[axis], std::stod(text[20 + axis]), kRounding);
-      EXPECT_NEAR(f32x3(body, 76)[axis], std::stod(text[23 + axis]), kRounding);
-    }
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(Logs, NovatelSampleTest,
-                         testing::Values("OneEach", "OnceEachAgain", "MorePropak",
-                                         "PropakWithGlonass"),
-                         [](const auto& log) { return std::string(log.param); });
 
 }  // namespace
 }  // namespace orrery::novatel
