@@ -14,7 +14,7 @@
 
 #include <cstdint>
 
-#include "bestxyz_parser.hpp"
+#include "gnss_fix.hpp"
 
 namespace formation_keeping {
 

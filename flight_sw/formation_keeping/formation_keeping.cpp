@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <cstring>
 
-#include "bestxyz_parser.hpp"
 #include "configuration.hpp"
 #include "constants.hpp"
 #include "crosslink_protocol.hpp"
@@ -76,7 +75,8 @@ class FormationKeeping {
 
   Host host_;
   Configuration configuration_;
-  BestxyzParser parser_;
+  unsigned char gnss_room_[kGnssRoomBytes];
+  novatel_framer gnss_framer_;
   CrosslinkSender sender_;
   CrosslinkReceiver receiver_;
   RelativeNavigation navigation_;
@@ -110,6 +110,7 @@ FormationKeeping::FormationKeeping(Host host, const orrery_boot& boot)
       receiver_(other(configuration_.role)),
       navigation_(configuration_.navigation),
       controller_(configuration_.control, configuration_.planner) {
+  novatel_framer_init(&gnss_framer_, gnss_room_, sizeof gnss_room_);
   if (is_deputy()) {
     reported_mode_ = Mode::kAcquiring;
     resume(boot.now_ns);
@@ -130,21 +131,18 @@ void FormationKeeping::resume(std::int64_t now_ns) {
 
 std::int32_t FormationKeeping::gnss(std::int64_t now_ns, Bytes bytes) {
   const unsigned char* data = static_cast<const unsigned char*>(bytes.data);
-  bool sound = true;
-  for (std::uint32_t k = 0; k < bytes.size; ++k) {
-    switch (parser_.push(data[k])) {
-      case BestxyzParser::Event::kFix:
-        handle_fix(now_ns, parser_.fix());
-        break;
-      case BestxyzParser::Event::kBadFrame:
-        sound = false;
-        break;
-      case BestxyzParser::Event::kNoFix:
-      case BestxyzParser::Event::kNothing:
-        break;
+  const std::uint32_t bad_before = gnss_framer_.bad_frames;
+  for (std::size_t left = bytes.size; left > 0;) {
+    const std::size_t taken = novatel_framer_write(&gnss_framer_, data, left);
+    data += taken;
+    left -= taken;
+    novatel_frame frame;
+    GnssFix fix;
+    while (novatel_framer_next(&gnss_framer_, &frame) != 0) {
+      if (read_fix(frame, &fix)) handle_fix(now_ns, fix);
     }
   }
-  return sound ? ORRERY_OK : reject();
+  return gnss_framer_.bad_frames == bad_before ? ORRERY_OK : reject();
 }
 
 void FormationKeeping::handle_fix(std::int64_t now_ns, const GnssFix& fix) {

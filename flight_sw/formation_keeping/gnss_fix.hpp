@@ -1,16 +1,10 @@
-/// Finds NovAtel BESTXYZ logs in a byte stream that may be cut anywhere.
-///
-/// Method  Only a header that announces exactly a BESTXYZ body is collected; every other byte is
-///         scanned over. No length field is trusted before its CRC, so a corrupted or unknown log
-///         can neither stall the parser nor make it skip the log behind it: after a bad CRC the
-///         scan resumes one byte behind the false start, inside the bytes already held.
-/// Memory  One frame of 144 bytes. No allocation.
-/// Source  NovAtel OEM7 Commands and Logs Reference: binary header, BESTXYZ (241), CRC-32.
+/// A position and velocity solution, as formation keeping takes it from a BESTXYZ log.
 #pragma once
 
 #include <cstdint>
 
 #include "support/matrix.hpp"
+#include "support/novatel/novatel.h"
 
 namespace formation_keeping {
 
@@ -27,30 +21,12 @@ struct GnssFix {
 /// zero, time between 1980 and 2099.
 bool is_plausible(const GnssFix& fix);
 
-class BestxyzParser {
- public:
-  static constexpr int kFrameBytes = 28 + 112 + 4;
+/// Room for the framer of a stream of which only BESTXYZ is wanted: longer logs are passed over,
+/// and a damaged length delays a fix by no more than one frame.
+constexpr std::size_t kGnssRoomBytes = 28 + 112 + 4;
 
-  enum class Event {
-    kNothing,   ///< the byte completed nothing
-    kFix,       ///< fix() is a new solution
-    kNoFix,     ///< a sound frame without a usable solution: not computed, no time, out of range
-    kBadFrame,  ///< a frame was dropped for its CRC
-  };
-
-  /// Takes one byte of the stream.
-  Event push(unsigned char byte);
-  /// The last solution; valid after kFix.
-  const GnssFix& fix() const { return fix_; }
-
- private:
-  bool could_be_frame() const;
-  void drop_first_and_resynchronise();
-  bool decode();
-
-  unsigned char held_[kFrameBytes] = {};
-  int count_ = 0;
-  GnssFix fix_;
-};
+/// False, with `fix` unchanged, for any other log and for one without a usable solution: not
+/// computed, no time, not plausible.
+bool read_fix(const novatel_frame& frame, GnssFix* fix);
 
 }  // namespace formation_keeping

@@ -20,7 +20,7 @@
 
 #include <cstdint>
 
-#include "bestxyz_parser.hpp"
+#include "gnss_fix.hpp"
 #include "gaussian.hpp"
 
 namespace formation_keeping {

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <vector>
 
-#include "formation_keeping/bestxyz_parser.hpp"
+#include "formation_keeping/gnss_fix.hpp"
 #include "formation_keeping/constants.hpp"
 #include "formation_keeping/relative_elements.hpp"
 #include "orrery_messages.h"

@@ -1,4 +1,4 @@
-#include "formation_keeping/bestxyz_parser.hpp"
+#include "formation_keeping/gnss_fix.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,6 @@ namespace formation_keeping {
 namespace {
 
 using Bytes = std::vector<unsigned char>;
-using Event = BestxyzParser::Event;
 
 GnssFix some_fix() {
   GnssFix fix;
@@ -25,25 +24,24 @@ struct Heard {
   GnssFix last;
 };
 
+// Byte by byte, as the slowest of serial lines.
 Heard parse(const Bytes& stream) {
-  BestxyzParser parser;
+  unsigned char room[kGnssRoomBytes];
+  novatel_framer framer;
+  novatel_framer_init(&framer, room, sizeof room);
   Heard heard;
-  for (unsigned char byte : stream) {
-    switch (parser.push(byte)) {
-      case Event::kFix:
+  for (const unsigned char byte : stream) {
+    EXPECT_EQ(novatel_framer_write(&framer, &byte, 1), 1u);
+    novatel_frame frame;
+    while (novatel_framer_next(&framer, &frame) != 0) {
+      if (read_fix(frame, &heard.last)) {
         ++heard.fixes;
-        heard.last = parser.fix();
-        break;
-      case Event::kBadFrame:
-        ++heard.bad;
-        break;
-      case Event::kNoFix:
+      } else {
         ++heard.no_fix;
-        break;
-      case Event::kNothing:
-        break;
+      }
     }
   }
+  heard.bad = static_cast<int>(framer.bad_frames);
   return heard;
 }
 
@@ -52,7 +50,7 @@ Bytes operator+(Bytes a, const Bytes& b) {
   return a;
 }
 
-TEST(BestxyzParserTest, ReadsEveryField) {
+TEST(GnssFixTest, ReadsEveryField) {
   const Heard heard = parse(flight_test::bestxyz_frame(some_fix()));
   ASSERT_EQ(heard.fixes, 1);
   EXPECT_EQ(heard.last.epoch_ns, some_fix().epoch_ns);
@@ -64,9 +62,9 @@ TEST(BestxyzParserTest, ReadsEveryField) {
   EXPECT_DOUBLE_EQ(heard.last.sigma_v_mps, 0.03125);
 }
 
-// The parser holds no more than a frame, so a stream that starts at any byte of one is found again
+// The framer holds no more than a frame, so a stream that starts at any byte of one is found again
 // at the next.
-TEST(BestxyzParserTest, FindsTheNextFrameWhereverTheStreamBegins) {
+TEST(GnssFixTest, FindsTheNextFrameWhereverTheStreamBegins) {
   const Bytes frame = flight_test::bestxyz_frame(some_fix());
   for (std::size_t cut = 1; cut <= frame.size(); ++cut) {
     const Bytes tail(frame.begin() + static_cast<std::ptrdiff_t>(cut), frame.end());
@@ -74,7 +72,7 @@ TEST(BestxyzParserTest, FindsTheNextFrameWhereverTheStreamBegins) {
   }
 }
 
-TEST(BestxyzParserTest, FindsTheNextFrameWhereverTheFirstBreaksOff) {
+TEST(GnssFixTest, FindsTheNextFrameWhereverTheFirstBreaksOff) {
   const Bytes frame = flight_test::bestxyz_frame(some_fix());
   for (std::size_t cut = 1; cut < frame.size(); ++cut) {
     const Bytes head(frame.begin(), frame.begin() + static_cast<std::ptrdiff_t>(cut));
@@ -83,7 +81,7 @@ TEST(BestxyzParserTest, FindsTheNextFrameWhereverTheFirstBreaksOff) {
 }
 
 // CRC-32 detects every single-bit error; a flip in the sync or the header means no frame at all.
-TEST(BestxyzParserTest, NoFlippedBitPasses) {
+TEST(GnssFixTest, NoFlippedBitPasses) {
   const Bytes frame = flight_test::bestxyz_frame(some_fix());
   for (std::size_t bit = 0; bit < 8 * frame.size(); ++bit) {
     Bytes flipped = frame;
@@ -93,7 +91,7 @@ TEST(BestxyzParserTest, NoFlippedBitPasses) {
   }
 }
 
-TEST(BestxyzParserTest, GarbageHidesNoFrame) {
+TEST(GnssFixTest, GarbageHidesNoFrame) {
   flight_test::Noise noise(7);
   Bytes stream;
   for (int k = 0; k < 200; ++k) {
@@ -112,13 +110,13 @@ TEST(BestxyzParserTest, GarbageHidesNoFrame) {
 }
 
 // A header that announces 65,535 bytes must not swallow the log behind it.
-TEST(BestxyzParserTest, AHugeLengthIsNotWaitedFor) {
+TEST(GnssFixTest, AHugeLengthIsNotWaitedFor) {
   Bytes huge = flight_test::bestxyz_frame(some_fix());
   flight_test::put_u16(&huge, 8, 65535);
   EXPECT_EQ(parse(huge + flight_test::bestxyz_frame(some_fix())).fixes, 1);
 }
 
-TEST(BestxyzParserTest, OtherLogsArePassedOver) {
+TEST(GnssFixTest, OtherLogsArePassedOver) {
   Bytes other(28 + 44 + 4, 0x55);
   other[0] = 0xAA, other[1] = 0x44, other[2] = 0x12, other[3] = 28;
   flight_test::put_u16(&other, 4, 101);  // TIME
@@ -129,7 +127,7 @@ TEST(BestxyzParserTest, OtherLogsArePassedOver) {
   EXPECT_EQ(heard.bad, 0);
 }
 
-TEST(BestxyzParserTest, ASoundFrameWithoutASolutionIsNoFix) {
+TEST(GnssFixTest, ASoundFrameWithoutASolutionIsNoFix) {
   const auto with = [](std::size_t at, unsigned char value) {
     Bytes frame = flight_test::bestxyz_frame(some_fix());
     frame[at] = value;
@@ -143,7 +141,7 @@ TEST(BestxyzParserTest, ASoundFrameWithoutASolutionIsNoFix) {
   EXPECT_EQ(parse(with(28 + 15, 0x7F)).no_fix, 1);  // x is a huge number
 }
 
-TEST(BestxyzParserTest, WhatIsNoSpacecraftIsNoFix) {
+TEST(GnssFixTest, WhatIsNoSpacecraftIsNoFix) {
   GnssFix below = some_fix();
   below.r_ECEF = 0.5 * below.r_ECEF;
   GnssFix not_a_number = some_fix();
