@@ -68,6 +68,11 @@ bool is_host_time(std::string_view summary_line) {
   });
 }
 
+// The report's line on speed and command line.
+bool is_of_host(std::string_view report_line) {
+  return report_line.starts_with(",\"host\":");
+}
+
 bool is_text(std::string_view content) {
   return content.find('\0') == std::string_view::npos;
 }
@@ -91,11 +96,13 @@ FileDifference in_bytes(const std::string& file, std::string_view a, std::string
 std::optional<FileDifference> in_lines(const std::string& file, std::string_view a,
                                        std::string_view b) {
   const bool is_summary = fs::path(file).filename() == "summary.json";
+  const bool is_report = fs::path(file).filename() == "report.html";
   const std::vector<std::string_view> x = split(a, '\n'), y = split(b, '\n');
   for (std::size_t n = 0; n < std::max(x.size(), y.size()); ++n) {
     const auto from_a = line(x, n), from_b = line(y, n);
     if (from_a == from_b) continue;
     if (is_summary && from_a && from_b && is_host_time(*from_a) && is_host_time(*from_b)) continue;
+    if (is_report && from_a && from_b && is_of_host(*from_a) && is_of_host(*from_b)) continue;
     return FileDifference{
         file, {}, "line " + std::to_string(n + 1) + ": " + shown(from_a) + " and " + shown(from_b)};
   }

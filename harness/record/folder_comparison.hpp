@@ -22,7 +22,7 @@ struct FileDifference {
 /// by name.
 ///
 /// Ignored  what equal runs may write otherwise: manifest.json, and in summary.json the host times
-///          wall_s, flight_wall_s and x_real_time.
+///          wall_s, flight_wall_s and x_real_time; in report.html speed and command line.
 /// Tables   (.csv) are compared field by field; a first column that ends in GPS_ns is the time. All
 ///          else is compared line by line, or byte by byte where it is not text.
 /// @throws std::runtime_error  a folder or file cannot be read; names it.
