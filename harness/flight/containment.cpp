@@ -177,7 +177,19 @@ bool keep_exit_function(void (*function)(void*), void* argument) {
   return true;
 }
 
-constexpr ProcessHooks kProcessHooks = {keep_exit_function, on_exit_called};
+int call_stack(void** frames, int most) {
+  if (running_call == nullptr) return 0;
+  CrashCapture capture;
+  RunningCall call;  // the running one's capture is that of a crash
+  call.boundary = running_call->boundary;
+  call.capture = &capture;
+  capture_stack(call, 0);
+  const int count = std::min(capture.frame_count, most);
+  std::copy(capture.frames, capture.frames + count, frames);
+  return count;
+}
+
+constexpr ProcessHooks kProcessHooks = {keep_exit_function, on_exit_called, call_stack};
 
 // ---- set-up
 

@@ -31,6 +31,14 @@ std::string first_bytes(const ByteBuffer& bytes) {
   return bytes.size() > kMost ? text + "..." : text;
 }
 
+// Nothing if there are no frames.
+std::string stack_text(const std::string& title, const std::vector<StackFrame>& frames) {
+  if (frames.empty()) return "";
+  std::string text = "  " + title + ", innermost first:\n";
+  for (std::size_t i = 0; i < frames.size(); ++i) text += frame_line(i, frames[i]);
+  return text;
+}
+
 }  // namespace
 
 const char* to_string(CrashKind kind) {
@@ -59,6 +67,12 @@ const char* to_string(CrashKind kind) {
   return "unknown crash";
 }
 
+std::string to_string(const std::vector<StackFrame>& frames) {
+  std::string text;
+  for (std::size_t i = 0; i < frames.size(); ++i) text += frame_line(i, frames[i]);
+  return text;
+}
+
 std::string to_string(const CrashReport& report) {
   std::string text = report.spacecraft + "/" + report.process + " (" + report.library +
                      ") crashed in " + report.call;
@@ -70,11 +84,10 @@ std::string to_string(const CrashReport& report) {
             " bytes: " + first_bytes(report.input) + "\n";
   }
   if (report.work != 0) text += "  work: " + std::to_string(report.work) + " edges\n";
-  if (!report.backtrace.empty()) text += "  stack, innermost first:\n";
-  for (std::size_t i = 0; i < report.backtrace.size(); ++i) {
-    text += frame_line(i, report.backtrace[i]);
-  }
-  return text;
+  return text + stack_text("stack", report.backtrace) +
+         stack_text("the block was allocated at " + to_string(report.block_allocated) + " by",
+                    report.block_allocated_by) +
+         stack_text("and freed at " + to_string(report.block_freed) + " by", report.block_freed_by);
 }
 
 }  // namespace orrery

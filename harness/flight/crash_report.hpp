@@ -18,7 +18,7 @@ enum class CrashKind : std::uint8_t {
   kFatalStatus,    // the library returned ORRERY_FATAL
   kUnknownStatus,  // the library returned a status that the ABI does not know
   kBootFailure,    // create returned anything but ORRERY_OK
-  kHeapFault,      // double free, free of what is no block, overwritten block header
+  kHeapFault,      // HeapFault: double free, overwritten header, write after free ...
   kHeapExhausted,  // passed the cap, with HeapExhaustion::kCrash
   kNoProgress,     // its tick fired over and over at one instant
 };
@@ -31,6 +31,9 @@ struct StackFrame {
   std::uintptr_t offset = 0;  // of the address in that file
   std::string function;       // demangled; empty if the file does not tell
 };
+
+/// A line per frame.
+std::string to_string(const std::vector<StackFrame>& frames);
 
 struct CrashReport {
   std::string spacecraft, process, library;
@@ -46,6 +49,9 @@ struct CrashReport {
   std::uint64_t work = 0;             // edges that the call had counted; 0 without COUNT_WORK
   std::vector<StackFrame> backtrace;  // empty where the library returned a status
   std::uint64_t seed = 0;             // of the run; 0 outside of one
+  // The block that a heap fault is about, with HeapRules::track_sites; else empty.
+  SimTime block_allocated, block_freed;
+  std::vector<StackFrame> block_allocated_by, block_freed_by;
 };
 
 /// Several lines for people. Addresses are in it: never for a fingerprint.

@@ -48,6 +48,7 @@ class FlightComputer::Impl {
   std::unique_ptr<FlightProcess> process;
   std::vector<FlightPort> ports;
   OnboardClock clock;
+  HeapHistory history;
   std::uint64_t crashes = 0, boots = 0, calls = 0, rejected = 0, inputs_lost = 0,
                 outputs_discarded = 0;
   std::vector<std::uint64_t> dropped;  // by port
@@ -121,6 +122,7 @@ FlightComputer::Impl::Impl(EventLoop& loop, OwnerId owner, FlightProcessOptions 
     : options(std::move(flight_options)),
       process(std::make_unique<FlightProcess>(options)),
       ports(process->ports()),
+      history(loop.now()),
       loop_(loop),
       owner_(owner),
       hooks_(std::move(hooks)),
@@ -444,6 +446,7 @@ void FlightComputer::Impl::tell(CallOutcome outcome) {
       hooks_.on_log(line.level, line.text);
     }
   }
+  if (process->simulated_heap() != nullptr) history.add(process->call_record());
   if (hooks_.on_call) hooks_.on_call(process->call_record());
   if (outcome == CallOutcome::kCrashed && hooks_.on_crash) hooks_.on_crash(process->crash());
 }
@@ -534,6 +537,12 @@ HeapFigures FlightComputer::heap() const {
 void FlightComputer::set_heap_limit(std::uint64_t bytes) {
   if (impl_->process != nullptr) impl_->process->set_heap_limit(bytes);
   impl_->options.heap_bytes = bytes;
+}
+const HeapHistory& FlightComputer::heap_history() const {
+  return impl_->history;
+}
+FlightProcess* FlightComputer::process() {
+  return impl_->process.get();
 }
 std::int64_t FlightComputer::onboard_ns() const {
   return impl_->onboard_ns();

@@ -87,6 +87,10 @@ class FlightComputer {
   HeapFigures heap() const;
   /// @throws std::invalid_argument  above 4 GiB less 1 MiB.
   void set_heap_limit(std::uint64_t bytes);
+  /// A sample per call; empty where heaps are not simulated.
+  const HeapHistory& heap_history() const;
+  /// For its heap; calling it is the computer's. Another one after a reboot, null while off.
+  FlightProcess* process();
   std::int64_t onboard_ns() const;  // what the spacecraft's clock shows now
   OnboardClock& clock();
   Duration host_time_in_flight() const;  // for reports only

@@ -26,22 +26,6 @@ void check_name(const char* what, const std::string& name) {
   }
 }
 
-void check_heap_limit(const char* function, std::uint64_t bytes) {
-  if (bytes > BlockHeap::kMaxLimit_bytes) {
-    throw std::invalid_argument(std::string(function) + ": heap limit = " + std::to_string(bytes) +
-                                " bytes is above " + std::to_string(BlockHeap::kMaxLimit_bytes));
-  }
-}
-
-// Also where heaps are not simulated: a mistake must not show under one preset only.
-void check_heap(const FlightProcessOptions& options) {
-  if (options.heap_alignment != 8 && options.heap_alignment != 16) {
-    throw std::invalid_argument("FlightProcess: heap_alignment = " +
-                                std::to_string(options.heap_alignment) + " bytes; it is 8 or 16");
-  }
-  check_heap_limit("FlightProcess", options.heap_bytes);
-}
-
 HeapOptions heap_options(const FlightProcessOptions& options) {
   return {.alignment = options.heap_alignment,
           .limit_bytes = options.heap_bytes,
@@ -53,15 +37,17 @@ HeapOptions heap_options(const FlightProcessOptions& options) {
 FlightProcess::Impl::Impl(FlightProcessOptions o) : options(std::move(o)) {
   check_name("spacecraft", options.spacecraft);
   check_name("process", options.process);
-  check_heap(options);
+  // Also where heaps are not simulated: a mistake must not show under one preset only.
+  check_heap_options("FlightProcess", heap_options(options));
   name = process_name(options);
   contained_.name = name.c_str();
   if (internal::call_in_progress()) {
     throw std::logic_error("FlightProcess: loaded from within a call of flight code");
   }
-  if (heap_simulation_available()) {
+  if (heap_simulation_available() || heap_accounting_available()) {
     heap = std::make_unique<SimulatedHeap>(heap_options(options));
     heap->blocks().set_fault_handler(on_heap_fault, this);
+    if (options.isolation == Isolation::kShared) heap->take_others_blocks();
     contained_.heap = heap.get();
   }
   fill_host_table();
@@ -86,7 +72,7 @@ void FlightProcess::Impl::load() {
           capture_)) {
     const CrashKind kind = capture_.kind;
     die(kind, capture_.message, SimTime{}, arguments_);
-    if (heap == nullptr) library->keep_loaded();
+    if (!heap_simulation_available()) library->keep_loaded();
     refuse(std::string("it crashes while it is loaded: ") + to_string(kind) + ": " + crash.message);
   }
   try {
@@ -101,7 +87,7 @@ void FlightProcess::Impl::load() {
 FlightProcess::Impl::~Impl() {
   if (!crashed && !ended) shut_down_library();
   // Without our __cxa_atexit the C library keeps the dead process's destructors, and runs them.
-  if (crashed && heap == nullptr) library->keep_loaded();
+  if (crashed && !heap_simulation_available()) library->keep_loaded();
 }
 
 // What remains of the library after destroy: its static destructors, in reverse order. False: they
@@ -206,7 +192,11 @@ void FlightProcess::Impl::end_call(SimTime truth) {
     record.transient_peak_bytes = blocks.peak_since_mark_bytes();
     record.heap_bytes = blocks.heap_bytes();
     record.largest_free_bytes = blocks.largest_free_bytes();
+    record.free_list_length = blocks.free_list_length();
     record.allocations = blocks.allocations() - allocations_before_;
+    if (heap->watch_if_any() != nullptr) {
+      if (HeapTraceWriter* trace = heap->watch().trace()) trace->call_returned(truth);
+    }
   }
   report_floating_point();
 }
@@ -247,6 +237,7 @@ void FlightProcess::Impl::die(CrashKind kind, std::string message, SimTime truth
   }
   crash.backtrace = internal::stack_frames(capture_, library->loaded_path());
   capture_.frame_count = 0;
+  if (kind == CrashKind::kHeapFault) tell_of_block(fault_address_);
 
   cut_off();
 }
@@ -258,6 +249,52 @@ void FlightProcess::Impl::cut_off() {
   tick_request.reset();
   contained_.exit_functions.clear();
   if (heap != nullptr) heap->drop();
+}
+
+void FlightProcess::Impl::tell_of_block(const void* address) {
+  if (heap == nullptr || heap->watch_if_any() == nullptr) return;
+  const HeapSite* site = heap->watch_if_any()->site_of(address);
+  if (site == nullptr) return;
+  crash.block_allocated = site->allocated_at;
+  crash.block_allocated_by = frames(site->allocated_by);
+  crash.block_freed = site->freed_at;
+  crash.block_freed_by = frames(site->freed_by);
+}
+
+std::vector<StackFrame> FlightProcess::Impl::frames(const CallStack& stack) const {
+  internal::CrashCapture capture;
+  for (const void* frame : stack) capture.frames[capture.frame_count++] = const_cast<void*>(frame);
+  return internal::stack_frames(capture, library->loaded_path());
+}
+
+std::string FlightProcess::Impl::check_heap() {
+  if (heap == nullptr || crashed) return "";
+  const std::optional<HeapFault> fault = heap->blocks().find_fault();
+  if (!fault) return "";
+  char address[32];
+  std::snprintf(address, sizeof address, "%p", fault->address);
+  std::string text = "heap of " + name + ": " + to_string(fault->kind) + " at " + address + "\n";
+  const HeapWatch* watch = heap->watch_if_any();
+  const HeapSite* site = watch == nullptr ? nullptr : watch->site_of(fault->address);
+  if (site == nullptr) return text;
+  text += "  the block was allocated at " + to_string(site->allocated_at) + " by\n" +
+          to_string(frames(site->allocated_by));
+  if (site->live) return text;
+  return text + "  and freed at " + to_string(site->freed_at) + " by\n" +
+         to_string(frames(site->freed_by));
+}
+
+std::vector<LeakReport> FlightProcess::Impl::leaks(std::uint64_t after, std::uint64_t until) const {
+  if (!options.heap.track_sites) {
+    throw std::logic_error("FlightProcess::leaks: " + name +
+                           " keeps no record of its blocks; set HeapRules::track_sites");
+  }
+  std::vector<LeakReport> reports;
+  if (heap == nullptr) return reports;
+  for (const HeapLeak& leak : heap->watch_if_any()->live_since(after, until)) {
+    reports.push_back({leak.blocks, leak.bytes, leak.first, frames(leak.allocated_by)});
+  }
+  return reports;
 }
 
 void FlightProcess::Impl::require_between_calls(const char* function) const {
@@ -291,16 +328,20 @@ void FlightProcess::Impl::host_log(LogLevel level, std::string_view text) {
 }
 
 void FlightProcess::Impl::on_heap_fault(void* self, const HeapFault& fault) {
-  const Impl& process = *static_cast<Impl*>(self);
+  Impl& process = *static_cast<Impl*>(self);
   char message[160];
   if (fault.kind == HeapFault::Kind::kExhausted) {
-    if (process.options.heap_exhaustion != HeapExhaustion::kCrash) return;
+    // A sanitizer tells when it is too late for a null.
+    if (process.options.heap_exhaustion != HeapExhaustion::kCrash && heap_simulation_available()) {
+      return;
+    }
     std::snprintf(message, sizeof message, "%s of %llu bytes would pass the heap's limit of %llu",
                   fault.during, static_cast<unsigned long long>(fault.bytes),
                   static_cast<unsigned long long>(process.heap->blocks().limit_bytes()));
     internal::end_running_call(CrashKind::kHeapExhausted, message);
     return;
   }
+  process.fault_address_ = fault.address;
   std::snprintf(message, sizeof message, "%s %p in %s", to_string(fault.kind), fault.address,
                 fault.during);
   internal::end_running_call(CrashKind::kHeapFault, message);
@@ -398,10 +439,27 @@ HeapFigures FlightProcess::heap() const {
   return impl_->heap == nullptr ? HeapFigures{} : impl_->heap->blocks().figures();
 }
 void FlightProcess::set_heap_limit(std::uint64_t bytes) {
-  check_heap_limit("FlightProcess::set_heap_limit", bytes);
+  FlightProcessOptions changed = impl_->options;
+  changed.heap_bytes = bytes;
+  check_heap_options("FlightProcess::set_heap_limit", heap_options(changed));
   impl_->options.heap_bytes = bytes;
   if (impl_->heap != nullptr) impl_->heap->set_limit(bytes);
 }
+SimulatedHeap* FlightProcess::simulated_heap() {
+  return impl_->heap.get();
+}
+std::string FlightProcess::check_heap() {
+  return impl_->check_heap();
+}
+std::vector<LeakReport> FlightProcess::leaks(std::uint64_t after, std::uint64_t until) const {
+  return impl_->leaks(after, until);
+}
+std::string to_string(const LeakReport& leak) {
+  return std::to_string(leak.bytes) + " bytes in " + std::to_string(leak.blocks) +
+         " blocks, the first of " + to_string(leak.first) + ", allocated by\n" +
+         to_string(leak.allocated_by);
+}
+
 const FlightProcess::Storage& FlightProcess::storage() const {
   return impl_->storage;
 }

@@ -5,6 +5,7 @@
 #include <orrery/harness/flight/crash_report.hpp>
 #include <orrery/harness/flight/flight_options.hpp>
 #include <orrery/harness/heap/heap_figures.hpp>
+#include <orrery/harness/heap/heap_history.hpp>
 #include <orrery/harness/kernel/bytes.hpp>
 #include <orrery/harness/kernel/time.hpp>
 
@@ -40,14 +41,18 @@ enum class ResetCause : std::uint8_t { kPowerOn = 0, kCommanded = 1, kWatchdog =
 enum class CallOutcome : std::uint8_t { kDone, kRejected, kCrashed };
 
 /// Heap of a process around one call.
-struct CallRecord {
-  SimTime t;
-  std::uint64_t resting_bytes = 0;         // live when the call returned
-  std::uint64_t transient_peak_bytes = 0;  // most live at once within the call
-  std::uint64_t heap_bytes = 0;
-  std::uint64_t largest_free_bytes = 0;
-  std::uint64_t allocations = 0;  // within the call
+using CallRecord = HeapSample;
+
+/// Blocks of one origin that are still live.
+struct LeakReport {
+  std::uint64_t blocks = 0;
+  std::uint64_t bytes = 0;  // asked for
+  SimTime first;            // when the oldest was allocated
+  std::vector<StackFrame> allocated_by;
 };
+std::string to_string(const LeakReport& leak);
+
+class SimulatedHeap;
 
 /// Runs flight code to completion and keeps it from the simulator, and the simulator from it.
 ///
@@ -116,6 +121,14 @@ class FlightProcess {
   /// Below what the heap already has is allowed: it stops growing.
   /// @throws std::invalid_argument  above 4 GiB less 1 MiB.
   void set_heap_limit(std::uint64_t bytes);
+  /// The heap itself, to look at and to watch; null where it is not simulated.
+  SimulatedHeap* simulated_heap();
+  /// Visits every block: empty, or what is wrong, with the stacks of the block if sites are
+  /// tracked. Also empty where heaps are not simulated, and of a dead process.
+  std::string check_heap();
+  /// Blocks allocated after one HeapWatch::mark() up to another that are live now, by call stack.
+  /// @throws std::logic_error  HeapRules::track_sites is off.
+  std::vector<LeakReport> leaks(std::uint64_t after, std::uint64_t until) const;
   /// Non-volatile storage; it outlives crash and shut-down, and may be handed to the next process.
   using Storage = std::vector<std::pair<std::uint32_t, ByteBuffer>>;  // by slot number, ascending
   const Storage& storage() const;

@@ -41,6 +41,8 @@ class FlightProcess::Impl {
                      ResetCause cause);
   void cut_off();
   bool shut_down_library();
+  std::string check_heap();
+  std::vector<LeakReport> leaks(std::uint64_t after, std::uint64_t until) const;
   void require_alive(const char* function) const;
   void require_between_calls(const char* function) const;
   void die_of_last_call(SimTime truth);
@@ -92,6 +94,8 @@ class FlightProcess::Impl {
   CallOutcome judge(const internal::CallArguments& arguments, SimTime truth);
   void host_log(LogLevel level, std::string_view text);
   void report_floating_point();
+  void tell_of_block(const void* address);
+  std::vector<StackFrame> frames(const CallStack& stack) const;
   bool calling() const { return internal::running_process() == &contained_; }
   std::uint32_t find_output(std::uint32_t id) const;
   static void on_heap_fault(void* self, const HeapFault& fault);
@@ -104,6 +108,7 @@ class FlightProcess::Impl {
   ByteBuffer input_;    // a copy, so that flight code cannot change the simulator's
   ByteBuffer staging_;  // a store that may still fault
   std::uint64_t allocations_before_ = 0;
+  const void* fault_address_ = nullptr;  // of the last heap fault
   bool reported_floating_point_ = false;
 };
 

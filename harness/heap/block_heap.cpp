@@ -8,28 +8,26 @@ namespace {
 
 void check_limit(const char* function, std::uint64_t bytes) {
   if (bytes > BlockHeap::kMaxLimit_bytes) {
-    throw std::invalid_argument(std::string(function) + ": limit = " + std::to_string(bytes) +
+    throw std::invalid_argument(std::string(function) + ": heap limit = " + std::to_string(bytes) +
                                 " bytes is above " + std::to_string(BlockHeap::kMaxLimit_bytes));
   }
 }
 
-void check_options(const void* arena, const HeapOptions& options) {
+}  // namespace
+
+void check_heap_options(const char* function, const HeapOptions& options) {
   if (options.alignment != 8 && options.alignment != 16) {
-    throw std::invalid_argument("make_heap: alignment = " + std::to_string(options.alignment) +
-                                " bytes; it is 8 or 16");
+    throw std::invalid_argument(std::string(function) + ": heap_alignment = " +
+                                std::to_string(options.alignment) + " bytes; it is 8 or 16");
   }
-  check_limit("make_heap", options.limit_bytes);
+  check_limit(function, options.limit_bytes);
   const std::uint32_t least = options.rules.least_block_bytes;
   if (least < 16 || least > 4096 || least % static_cast<std::uint32_t>(options.alignment) != 0) {
-    throw std::invalid_argument("make_heap: least_block_bytes = " + std::to_string(least) +
+    throw std::invalid_argument(std::string(function) +
+                                ": least_block_bytes = " + std::to_string(least) +
                                 "; it is a multiple of the alignment from 16 to 4096");
   }
-  if (reinterpret_cast<std::uintptr_t>(arena) % 16 != 0) {
-    throw std::invalid_argument("make_heap: the arena is not aligned to 16 bytes");
-  }
 }
-
-}  // namespace
 
 const char* to_string(HeapPolicy policy) {
   switch (policy) {
@@ -80,7 +78,10 @@ std::uint64_t BlockHeap::arena_bytes(const HeapOptions& options) {
 
 BlockHeap::BlockHeap(void* arena, const HeapOptions& options, std::uint32_t least_block_bytes)
     : least_(least_block_bytes), options_(options) {
-  check_options(arena, options);
+  check_heap_options("make_heap", options);
+  if (reinterpret_cast<std::uintptr_t>(arena) % 16 != 0) {
+    throw std::invalid_argument("make_heap: the arena is not aligned to 16 bytes");
+  }
   area_.arena = static_cast<std::byte*>(arena);
   area_.align = static_cast<std::uint32_t>(options.alignment);
   area_.first = area_.top = area_.align;
@@ -91,6 +92,20 @@ BlockHeap::BlockHeap(void* arena, const HeapOptions& options, std::uint32_t leas
 void BlockHeap::set_fault_handler(FaultHandler handler, void* context) {
   handler_ = handler;
   handler_context_ = context;
+}
+
+std::optional<HeapFault> BlockHeap::find_fault() {
+  std::optional<HeapFault> first;
+  const FaultHandler handler = handler_;
+  void* const context = handler_context_;
+  set_fault_handler(
+      [](void* found, const HeapFault& fault) {
+        static_cast<std::optional<HeapFault>*>(found)->emplace(fault);
+      },
+      &first);
+  check();
+  set_fault_handler(handler, context);
+  return first;
 }
 
 void BlockHeap::set_limit(std::uint64_t bytes) {
@@ -128,7 +143,7 @@ void* BlockHeap::fail(HeapFault::Kind kind, const void* address, const char* dur
 }
 
 void BlockHeap::visit_blocks(const std::function<void(const Block&)>& visit) const {
-  for (Offset block = area_.first; block < area_.top;) {
+  for (Offset block = area_.first; has_blocks_ && block < area_.top;) {
     const std::uint32_t found = area_.header(block);
     if (!area_.sound(block, found)) return;
     const std::uint32_t size = found & ~kLive;
@@ -142,7 +157,7 @@ HeapFigures BlockHeap::figures() const {
   f.limit_bytes = options_.limit_bytes;
   f.alignment = options_.alignment;
   f.resting_bytes = live_bytes_;
-  f.payload_bytes = live_bytes_ - kTags_bytes * live_blocks_;
+  f.payload_bytes = has_blocks_ ? live_bytes_ - kTags_bytes * live_blocks_ : live_bytes_;
   f.live_blocks = live_blocks_;
   f.transient_peak_bytes = peak_bytes_;
   f.high_water_bytes = high_water_bytes_;

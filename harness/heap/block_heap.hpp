@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 
 namespace orrery {
 
@@ -114,6 +115,8 @@ class BlockHeap {
   /// Visits every block and the list. True if all hold together; else false, and the handler was
   /// told of the first fault.
   virtual bool check() = 0;
+  /// check() without the handler: the first fault, if there is one.
+  std::optional<HeapFault> find_fault();
 
   struct Block {
     std::uint64_t begin = 0;  // bytes from the heap's first block
@@ -166,6 +169,7 @@ class BlockHeap {
   }
 
   internal::HeapArea area_;
+  bool has_blocks_ = true;  // in the arena; else only counts are kept
   std::uint32_t least_;
   std::uint64_t live_bytes_ = 0, peak_bytes_ = 0, high_water_bytes_ = 0;
   std::uint64_t live_blocks_ = 0, allocations_ = 0, frees_ = 0, failures_ = 0, search_steps_ = 0;
@@ -175,6 +179,10 @@ class BlockHeap {
   FaultHandler handler_ = nullptr;
   void* handler_context_ = nullptr;
 };
+
+/// @throws std::invalid_argument  an option is outside its range; the message begins with
+/// `function`.
+void check_heap_options(const char* function, const HeapOptions& options);
 
 /// @param arena  arena_bytes(options), aligned to 16, zeroed or not.
 /// @throws std::invalid_argument  alignment not 8 or 16, limit above kMaxLimit_bytes, least block

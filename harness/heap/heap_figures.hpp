@@ -29,7 +29,11 @@ struct HeapFigures {
 };
 
 /// True where flight software allocates from simulated heaps: the program links orrery::allocator
-/// and no sanitizer owns malloc. Elsewhere every figure stays 0 and caps have no effect.
+/// and no sanitizer owns malloc.
 bool heap_simulation_available();
+/// True where a sanitizer owns malloc but tells of what it allocates: figures are then of requested
+/// bytes, without tags and holes, and passing a cap is always a crash. Where neither is true every
+/// figure stays 0 and caps have no effect.
+bool heap_accounting_available();
 
 }  // namespace orrery

@@ -58,6 +58,14 @@ inline SimulatedHeap* heap_for(const void* caller) {
   return in_loader < orrery::internal::loader_bytes ? nullptr : heap;
 }
 
+// The heap that a block in an arena goes back to: its own, wherever the program is. But flight code
+// that hands in another process's block has that reported by its own heap, as a foreign pointer.
+inline SimulatedHeap* accountable_for(const void* payload) {
+  SimulatedHeap* owner = SimulatedHeap::owner_of(payload);
+  SimulatedHeap* current = orrery::current_heap;
+  return owner == nullptr || current == nullptr || current->takes_others_blocks() ? owner : current;
+}
+
 inline void* or_no_memory(void* payload) {
   if (payload == nullptr) errno = ENOMEM;
   return payload;
@@ -70,18 +78,18 @@ void* align(const void* caller, std::size_t alignment, std::size_t bytes) {
     errno = EINVAL;
     return nullptr;
   }
-  return or_no_memory(heap->blocks().allocate_aligned(alignment == 0 ? 1 : alignment, bytes));
+  return or_no_memory(heap->allocate_aligned(alignment == 0 ? 1 : alignment, bytes));
 }
 
 void* resize(const void* caller, void* payload, std::size_t bytes) {
   if (payload == nullptr) {
     SimulatedHeap* heap = heap_for(caller);
-    return heap == nullptr ? __libc_malloc(bytes) : or_no_memory(heap->blocks().allocate(bytes));
+    return heap == nullptr ? __libc_malloc(bytes) : or_no_memory(heap->allocate(bytes));
   }
   if (!Arena::contains(payload)) return __libc_realloc(payload, bytes);
-  SimulatedHeap* owner = SimulatedHeap::owner_of(payload);
+  SimulatedHeap* owner = accountable_for(payload);
   if (owner == nullptr) return or_no_memory(nullptr);  // its process is dead
-  void* resized = owner->blocks().reallocate(payload, bytes);
+  void* resized = owner->reallocate(payload, bytes);
   return bytes == 0 ? resized : or_no_memory(resized);
 }
 
@@ -91,7 +99,7 @@ constexpr std::size_t kPage_bytes = 4096;
 
 ORRERY_HOOK void* malloc(std::size_t bytes) noexcept {
   SimulatedHeap* heap = heap_for(__builtin_return_address(0));
-  return heap == nullptr ? __libc_malloc(bytes) : or_no_memory(heap->blocks().allocate(bytes));
+  return heap == nullptr ? __libc_malloc(bytes) : or_no_memory(heap->allocate(bytes));
 }
 
 ORRERY_HOOK void free(void* payload) noexcept {
@@ -100,14 +108,14 @@ ORRERY_HOOK void free(void* payload) noexcept {
     return;
   }
   // The memory of a dead process went with its arena.
-  SimulatedHeap* owner = SimulatedHeap::owner_of(payload);
-  if (owner != nullptr) owner->blocks().release(payload);
+  SimulatedHeap* owner = accountable_for(payload);
+  if (owner != nullptr) owner->release(payload);
 }
 
 ORRERY_HOOK void* calloc(std::size_t count, std::size_t bytes) noexcept {
   SimulatedHeap* heap = heap_for(__builtin_return_address(0));
   return heap == nullptr ? __libc_calloc(count, bytes)
-                         : or_no_memory(heap->blocks().allocate_zeroed(count, bytes));
+                         : or_no_memory(heap->allocate_zeroed(count, bytes));
 }
 
 ORRERY_HOOK void* realloc(void* payload, std::size_t bytes) noexcept {

@@ -29,6 +29,8 @@ struct ProcessHooks {
   bool (*register_exit)(void (*function)(void*), void* argument);
   /// Returns if no flight code is running.
   void (*exit)(int status);
+  /// The flight code on this thread's stack, innermost first: number of frames written.
+  int (*call_stack)(void** frames, int most);
 };
 extern const ProcessHooks* process_hooks;
 

@@ -3,11 +3,15 @@
 
 #include <orrery/harness/heap/arena.hpp>
 #include <orrery/harness/heap/block_heap.hpp>
+#include <orrery/harness/heap/heap_watch.hpp>
+
+#include <memory>
 
 namespace orrery {
 
-/// A heap in an arena of its own. Blocks are found by address, so what is allocated here
-/// may be freed while another heap is current, or none.
+/// A heap in an arena of its own, or, under a sanitizer, the account of one (accounting.hpp).
+/// Blocks are found by address, so what is allocated here may be freed while another heap is
+/// current, or none.
 class SimulatedHeap {
  public:
   /// @throws std::invalid_argument  options outside their ranges; std::runtime_error  as Arena.
@@ -15,6 +19,40 @@ class SimulatedHeap {
   ~SimulatedHeap();
   SimulatedHeap(const SimulatedHeap&) = delete;
   SimulatedHeap& operator=(const SimulatedHeap&) = delete;
+
+  // What the allocation functions of the C library do while this heap is current, or its own.
+  void* allocate(std::size_t bytes) {
+    return watch_ == nullptr ? blocks_->allocate(bytes) : watched_allocate(bytes);
+  }
+  void* allocate_zeroed(std::size_t count, std::size_t bytes) {
+    return watch_ == nullptr ? blocks_->allocate_zeroed(count, bytes)
+                             : watched_allocate_zeroed(count, bytes);
+  }
+  void* allocate_aligned(std::size_t alignment, std::size_t bytes) {
+    return watch_ == nullptr ? blocks_->allocate_aligned(alignment, bytes)
+                             : watched_allocate_aligned(alignment, bytes);
+  }
+  void* reallocate(void* payload, std::size_t bytes) {
+    return watch_ == nullptr ? blocks_->reallocate(payload, bytes)
+                             : watched_reallocate(payload, bytes);
+  }
+  void release(void* payload) {
+    if (watch_ == nullptr) {
+      blocks_->release(payload);
+    } else {
+      watched_release(payload);
+    }
+  }
+
+  /// Made at the first call; from then on every request is watched. Rules that need one (fill,
+  /// track_sites) make it at once.
+  HeapWatch& watch();
+  const HeapWatch* watch_if_any() const { return watch_.get(); }
+
+  /// While this heap is current, blocks of other heaps may be freed and resized (there, by address);
+  /// else that is a foreign pointer. For instances that share a library's globals.
+  void take_others_blocks() { takes_others_blocks_ = true; }
+  bool takes_others_blocks() const { return takes_others_blocks_; }
 
   BlockHeap& blocks() { return *blocks_; }
   const BlockHeap& blocks() const { return *blocks_; }
@@ -27,8 +65,16 @@ class SimulatedHeap {
   static SimulatedHeap* owner_of(const void* address);
 
  private:
+  void* watched_allocate(std::size_t bytes);
+  void* watched_allocate_zeroed(std::size_t count, std::size_t bytes);
+  void* watched_allocate_aligned(std::size_t alignment, std::size_t bytes);
+  void* watched_reallocate(void* payload, std::size_t bytes);
+  void watched_release(void* payload);
+
   Arena arena_;
   std::unique_ptr<BlockHeap> blocks_;
+  std::unique_ptr<HeapWatch> watch_;
+  bool takes_others_blocks_ = false;
 };
 
 /// The heap from which this thread allocates; null: from the system's. Set by HeapGuard only.

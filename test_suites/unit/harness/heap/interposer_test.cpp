@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <cstring>
 #include <dlfcn.h>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -130,6 +131,32 @@ TEST_F(InterposerTest, BlocksOfADroppedHeapAreIgnored) {
   symbol<void(void*)>("probe_free")(left);
   EXPECT_EQ(symbol<void*(void*, std::size_t)>("probe_realloc")(left, 10), nullptr);
   EXPECT_EQ(heap_.blocks().live_bytes(), live);
+}
+
+TEST_F(InterposerTest, AnotherHeapsBlockIsForeignToFlightCode) {
+  SimulatedHeap other({.limit_bytes = 1 << 20});
+  const auto allocate = symbol<void*(std::size_t)>("probe_malloc");
+  const auto release = symbol<void(void*)>("probe_free");
+  void* block = nullptr;
+  {
+    const HeapGuard guard(&other);
+    block = allocate(24);
+  }
+  std::optional<HeapFault> fault;
+  heap_.blocks().set_fault_handler(
+      [](void* found, const HeapFault& f) {
+        static_cast<std::optional<HeapFault>*>(found)->emplace(f);
+      },
+      &fault);
+  {
+    const HeapGuard guard(&heap_);
+    release(block);
+  }
+  ASSERT_TRUE(fault);
+  EXPECT_EQ(fault->kind, HeapFault::Kind::kForeignPointer);
+  EXPECT_EQ(other.blocks().figures().live_blocks, 1u);
+  release(block);
+  EXPECT_EQ(other.blocks().figures().live_blocks, 0u);
 }
 
 TEST_F(InterposerTest, EqualCallsGiveEqualPointersInTheNextHeap) {

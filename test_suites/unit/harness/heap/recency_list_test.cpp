@@ -151,8 +151,8 @@ TEST_P(RecencyListTest, ChoosesTheBlockThatAWalkChooses) {
 INSTANTIATE_TEST_SUITE_P(Loads, RecencyListTest,
                          testing::Values(Case{8, false, 20, 200'000, 500},
                                          Case{16, true, 20, 200'000, 500},
-                                         Case{16, false, 500, 400'000, 4'000},
-                                         Case{8, true, 500, 400'000, 4'000},
+                                         Case{16, false, 500, 1'000'000, 4'000},
+                                         Case{8, true, 500, 1'000'000, 4'000},
                                          Case{8, false, 20'000, 120'000, 40'000},
                                          Case{16, true, 20'000, 120'000, 40'000}));
 
