@@ -22,10 +22,11 @@ struct Step {
   std::uint32_t slot, bytes;
 };
 
-// The deputy's requests over one orbit of the first flight. Its calloc and realloc, few, are played
-// as malloc, and as malloc and free.
+// The deputy's requests over one orbit, flying a program that uses its heap as estimators in C++
+// do (the package formation_keeping allocates once). calloc and realloc, of which there are few,
+// are played as malloc, and as malloc and free.
 std::vector<Step> recorded_flight() {
-  FormationOptions options = missions::first_flight({.flight = {.library = "formation_keeping"}});
+  FormationOptions options{.flight = {.library = "fixture_estimator"}};
   options.world.record = false;
   FormationWorld world(options);
   world.heap("deputy").record_trace();
