@@ -179,13 +179,15 @@ void NewlibBins::insert(HeapOffset block, std::uint32_t size, bool at_top) {
   }
 }
 
-void NewlibBins::insert_rest(HeapOffset block, std::uint32_t, bool at_top) {
+void NewlibBins::split(HeapOffset block, std::uint32_t found, HeapOffset rest, std::uint32_t,
+                       bool at_top) {
+  take(block, found);
   if (at_top) {
-    set_apart(wilderness_, block);
+    set_apart(wilderness_, rest);
     return;
   }
   if (remainder_ != 0) put_in_bin(remainder_, bins_.area().header(remainder_));
-  set_apart(remainder_, block);
+  set_apart(remainder_, rest);
 }
 
 void NewlibBins::remove(HeapOffset block, std::uint32_t size) {

@@ -65,7 +65,11 @@ class BestFitLists {
     const std::uint32_t list = two_level_class(size);
     lists_.insert_before(lists_.front(list), block, list);
   }
-  void insert_rest(HeapOffset block, std::uint32_t size, bool) { insert(block, size); }
+  void split(HeapOffset block, std::uint32_t found, HeapOffset rest, std::uint32_t size, bool) {
+    remove(block, found);
+    insert(rest, size);
+  }
+  bool rename_front(HeapOffset, HeapOffset, std::uint32_t) { return false; }
   void remove(HeapOffset block, std::uint32_t size) { lists_.unlink(block, two_level_class(size)); }
   void take(HeapOffset block, std::uint32_t size) { remove(block, size); }
   void replace(HeapOffset old, HeapOffset now, std::uint32_t size);
@@ -96,7 +100,9 @@ class NewlibBins {
   }
   bool holds(HeapOffset block, std::uint32_t size) const;
   void insert(HeapOffset block, std::uint32_t size, bool at_top);
-  void insert_rest(HeapOffset block, std::uint32_t size, bool at_top);
+  void split(HeapOffset block, std::uint32_t found, HeapOffset rest, std::uint32_t size,
+             bool at_top);
+  bool rename_front(HeapOffset, HeapOffset, std::uint32_t) { return false; }
   void remove(HeapOffset block, std::uint32_t size);
   void take(HeapOffset block, std::uint32_t size);
   void replace(HeapOffset old, HeapOffset now, std::uint32_t size);

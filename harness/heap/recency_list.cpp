@@ -8,6 +8,18 @@ std::uint32_t RecencyList::last_bucket(std::uint32_t g) const {
   return std::min(g * 64 + 63, (end_ - 1) / 64);
 }
 
+HeapOffset RecencyList::search(std::uint32_t size, std::uint64_t& steps) {
+  for (std::uint32_t g = (end_ - 1) / 4096 + 1; g-- > 0;) {
+    if (groups_[g].bound < size) {
+      steps += groups_[g].live;
+      continue;
+    }
+    const HeapOffset found = find_in_group(g, size, steps);
+    if (found != 0) return found;
+  }
+  return 0;
+}
+
 HeapOffset RecencyList::find_in_group(std::uint32_t g, std::uint32_t size, std::uint64_t& steps) {
   std::uint32_t group_bound = 0;
   const std::uint32_t first = g * 64;

@@ -42,50 +42,56 @@ class RecencyList {
     put(end_++, block, size);
     ++length_;
   }
-  void insert_rest(HeapOffset block, std::uint32_t size, bool at_top) {
-    insert(block, size, at_top);
-  }
 
   void remove(HeapOffset block, std::uint32_t) {
     const std::uint32_t slot = area_.word(block);
     Bucket& bucket = buckets_[slot / 64];
-    bucket.live &= ~(std::uint64_t{1} << (slot % 64));
-    if (bucket.live == 0) bucket.bound = 0;
+    const std::uint64_t live = bucket.live & ~(std::uint64_t{1} << (slot % 64));
+    bucket.live = live;
+    if (live == 0) bucket.bound = 0;
     --groups_[slot / 4096].live;
     --length_;
     // What was in front leaves no gap: the usual malloc after free.
     if (slot + 1 == end_) {
       const std::uint32_t begin = slot & ~63u;
-      end_ = bucket.live == 0
-                 ? begin
-                 : begin + 64 - static_cast<std::uint32_t>(std::countl_zero(bucket.live));
+      end_ = live == 0 ? begin : begin + 64 - static_cast<std::uint32_t>(std::countl_zero(live));
     }
   }
   void take(HeapOffset block, std::uint32_t size) { remove(block, size); }
 
-  /// `now` takes the place of `old` in the list.
-  void replace(HeapOffset old, HeapOffset now, std::uint32_t size) {
+  /// The block is taken, and its rest goes to the front.
+  void split(HeapOffset block, std::uint32_t found, HeapOffset rest, std::uint32_t size,
+             bool at_top) {
+    if (rename_front(block, rest, size)) return;
+    remove(block, found);
+    insert(rest, size, at_top);
+  }
+  /// If `old` is in front, `now` takes its place there: what removing and inserting would come to.
+  bool rename_front(HeapOffset old, HeapOffset now, std::uint32_t size) {
     const std::uint32_t slot = area_.word(old);
-    Bucket& bucket = buckets_[slot / 64];
-    bucket.block[slot % 64] = now;
-    bucket.size[slot % 64] = size;
-    area_.word(now) = slot;
-    area_.word(now + 4) = ~slot;
+    if (slot + 1 != end_) return false;
+    set(slot, now, size);
+    return true;
+  }
+  /// `now`, a part of `old`, takes its place in the list.
+  void replace(HeapOffset old, HeapOffset now, std::uint32_t size) {
+    set(area_.word(old), now, size);
   }
 
   /// The first block of at least `size`; 0: none. Adds the blocks that a walk would have looked
   /// at, this one included.
   HeapOffset find(std::uint32_t size, std::uint64_t& steps) {
     if (end_ == 0) return 0;
-    for (std::uint32_t g = (end_ - 1) / 4096 + 1; g-- > 0;) {
-      if (groups_[g].bound < size) {
-        steps += groups_[g].live;
-        continue;
+    // The front, where most searches end.
+    const Bucket& bucket = buckets_[(end_ - 1) / 64];
+    if (bucket.live != 0) {
+      const int i = 63 - std::countl_zero(bucket.live);
+      if (bucket.size[i] >= size) {
+        ++steps;
+        return bucket.block[i];
       }
-      const HeapOffset found = find_in_group(g, size, steps);
-      if (found != 0) return found;
     }
-    return 0;
+    return search(size, steps);
   }
 
   /// Size of the largest block.
@@ -105,17 +111,23 @@ class RecencyList {
   };
 
   void put(std::uint32_t slot, HeapOffset block, std::uint32_t size) {
+    buckets_[slot / 64].live |= std::uint64_t{1} << (slot % 64);
+    ++groups_[slot / 4096].live;
+    set(slot, block, size);
+  }
+  void set(std::uint32_t slot, HeapOffset block, std::uint32_t size) {
     Bucket& bucket = buckets_[slot / 64];
-    Group& group = groups_[slot / 4096];
-    bucket.live |= std::uint64_t{1} << (slot % 64);
     bucket.size[slot % 64] = size;
     bucket.block[slot % 64] = block;
-    if (bucket.bound < size) bucket.bound = size;
-    if (group.bound < size) group.bound = size;
-    ++group.live;
+    if (bucket.bound < size) {
+      bucket.bound = size;
+      Group& group = groups_[slot / 4096];
+      if (group.bound < size) group.bound = size;
+    }
     area_.word(block) = slot;
     area_.word(block + 4) = ~slot;
   }
+  HeapOffset search(std::uint32_t size, std::uint64_t& steps);
   HeapOffset find_in_group(std::uint32_t g, std::uint32_t size, std::uint64_t& steps);
   std::uint32_t last_bucket(std::uint32_t g) const;
   void make_room();

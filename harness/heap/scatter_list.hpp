@@ -22,9 +22,12 @@ class ScatterList {
     return i < length_ && area_.word(block + 4) == ~i && blocks_[i] == block;
   }
   void insert(HeapOffset block, std::uint32_t size, bool at_top = false);
-  void insert_rest(HeapOffset block, std::uint32_t size, bool at_top) {
-    insert(block, size, at_top);
+  void split(HeapOffset block, std::uint32_t found, HeapOffset rest, std::uint32_t size,
+             bool at_top) {
+    remove(block, found);
+    insert(rest, size, at_top);
   }
+  bool rename_front(HeapOffset, HeapOffset, std::uint32_t) { return false; }
   void remove(HeapOffset block, std::uint32_t size);
   void take(HeapOffset block, std::uint32_t size) { remove(block, size); }
   void replace(HeapOffset old, HeapOffset now, std::uint32_t size);

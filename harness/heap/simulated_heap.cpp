@@ -5,10 +5,13 @@
 #include <array>
 
 namespace orrery {
-namespace {
-
-// By slot. Plain pointers: a heap belongs to the one thread that runs its process.
+namespace internal {
 constinit std::array<SimulatedHeap*, Arena::kSlots> heap_of_slot{};
+}  // namespace internal
+
+using internal::heap_of_slot;
+
+namespace {
 
 std::unique_ptr<BlockHeap> heap_in(Arena& arena, const HeapOptions& options) {
   if (heap_accounting_available()) {
@@ -91,10 +94,6 @@ void SimulatedHeap::watched_release(void* payload) {
   if (payload == nullptr) return;
   watch_->released(payload);
   blocks_->release(payload);
-}
-
-SimulatedHeap* SimulatedHeap::owner_of(const void* address) {
-  return Arena::contains(address) ? heap_of_slot[Arena::slot_of(address)] : nullptr;
 }
 
 }  // namespace orrery

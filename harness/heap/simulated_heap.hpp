@@ -5,9 +5,17 @@
 #include <orrery/harness/heap/block_heap.hpp>
 #include <orrery/harness/heap/heap_watch.hpp>
 
+#include <array>
 #include <memory>
 
 namespace orrery {
+
+class SimulatedHeap;
+
+namespace internal {
+/// By arena slot. Plain pointers: a heap belongs to the one thread that runs its process.
+extern std::array<SimulatedHeap*, Arena::kSlots> heap_of_slot;
+}  // namespace internal
 
 /// A heap in an arena of its own, or, under a sanitizer, the account of one (accounting.hpp).
 /// Blocks are found by address, so what is allocated here may be freed while another heap is
@@ -49,8 +57,8 @@ class SimulatedHeap {
   HeapWatch& watch();
   const HeapWatch* watch_if_any() const { return watch_.get(); }
 
-  /// While this heap is current, blocks of other heaps may be freed and resized (there, by address);
-  /// else that is a foreign pointer. For instances that share a library's globals.
+  /// While this heap is current, blocks of other heaps may be freed and resized (there, by
+  /// address); else that is a foreign pointer. For instances that share a library's globals.
   void take_others_blocks() { takes_others_blocks_ = true; }
   bool takes_others_blocks() const { return takes_others_blocks_; }
 
@@ -62,7 +70,9 @@ class SimulatedHeap {
   void drop();
 
   /// The heap that owns the address, if its slot is in use and not dropped.
-  static SimulatedHeap* owner_of(const void* address);
+  static SimulatedHeap* owner_of(const void* address) {
+    return Arena::contains(address) ? internal::heap_of_slot[Arena::slot_of(address)] : nullptr;
+  }
 
  private:
   void* watched_allocate(std::size_t bytes);

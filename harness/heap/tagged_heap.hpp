@@ -19,8 +19,8 @@ struct BlockRules {
        realloc_grows_top = false;
 };
 
-/// List has: holds, insert, insert_rest, remove, take, replace, find, largest, length, check (see
-/// RecencyList), and `static constexpr bool kScatters`.
+/// List has: holds, insert, remove, take, split, rename_front, replace, find, largest, length,
+/// check (see RecencyList), and `static constexpr bool kScatters`.
 template <class List>
 class TaggedHeap final : public BlockHeap {
  public:
@@ -86,6 +86,8 @@ class TaggedHeap final : public BlockHeap {
   }
   bool check_blocks(std::uint64_t& free_blocks);
 
+  void poison_joined(Offset payload, std::uint32_t size, bool join_after,
+                     std::uint32_t leader) const;
   void poison(Offset from, std::uint32_t bytes) const {
     std::memset(pointer(from), kPoison, bytes);
   }
@@ -209,10 +211,10 @@ HeapOffset TaggedHeap<List>::take_free(std::uint32_t size, const char* during) {
     area_.tag(block + size, rest, 0);
     area_.tag(block, size, kLive);
   } else {
-    list_.take(block, found);
-    area_.tag(block, size, kLive);
-    area_.tag(block + size, rest, 0);
-    list_.insert_rest(block + size, rest, block + found == area_.top);
+    const HeapArea area = area_;  // a copy, which stores to the arena cannot change
+    list_.split(block, found, block + size, rest, block + found == area.top);
+    area.tag(block, size, kLive);
+    area.tag(block + size, rest, 0);
   }
   return block;
 }
@@ -331,23 +333,39 @@ bool TaggedHeap<List>::push_joined(Offset payload, std::uint32_t size) {
   const bool join_before = (leader & kLive) == 0;
   if (join_after && !sound_free(after, follower)) return corrupt(after, "free");
   if (join_before && !leads(payload, leader)) return corrupt(payload, "free");
-  if (poison_) poison(payload, size - kTags_bytes);
+  if (poison_) poison_joined(payload, size, join_after, join_before ? leader : 0);
+  if (join_after != join_before) {
+    const Offset neighbour = join_after ? after : payload - leader;
+    const Offset joined = join_after ? payload : neighbour;
+    const std::uint32_t joined_size = size + (join_after ? follower : leader);
+    if (list_.rename_front(neighbour, joined, joined_size)) {
+      area_.tag(joined, joined_size, 0);
+      if (poison_ && join_after) poison(after, kLink_bytes);
+      return true;
+    }
+  }
   if (join_after) {
     list_.remove(after, follower);
-    if (poison_) poison(after - kTags_bytes, kTags_bytes + kLink_bytes);
+    if (poison_) poison(after, kLink_bytes);
     size += follower;
   }
   if (join_before) {
-    list_.remove(payload - leader, leader);
-    if (poison_) {
-      poison(payload - kTags_bytes, kTags_bytes);
-      poison(payload - leader, kLink_bytes);
-    }
     payload -= leader;
+    list_.remove(payload, leader);
     size += leader;
   }
   insert(payload, size);
   return true;
+}
+
+// What will be the inside of a free block: the new one, and tags between it and its neighbours. The
+// links of the one behind it follow when it has left the list.
+template <class List>
+void TaggedHeap<List>::poison_joined(Offset payload, std::uint32_t size, bool join_after,
+                                     std::uint32_t leader) const {
+  poison(payload + kLink_bytes, size - kTags_bytes - kLink_bytes);
+  if (join_after) poison(payload + size - kTags_bytes, kTags_bytes);
+  if (leader != 0) poison(payload - kTags_bytes, kTags_bytes + kLink_bytes);
 }
 
 // ---- checks

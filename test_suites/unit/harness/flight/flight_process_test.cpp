@@ -137,7 +137,7 @@ TEST_F(FlightProcessTest, StorageOutlivesTheProcess) {
   EXPECT_THAT(said(next), ElementsAre("defg"));
 }
 
-// malloc(n) takes 8 + n rounded up to 16 (alignment 16) or 8 (alignment 8); see first_fit_heap.hpp.
+// malloc(n) takes 8 + n rounded up to 16 (alignment 16) or 8 (alignment 8); see block_heap.hpp.
 TEST_F(FlightProcessTest, HeapFiguresAreExactToTheByte) {
   if (!heap_simulation_available()) GTEST_SKIP() << "a sanitizer owns malloc";
   for (const int alignment : {8, 16}) {
@@ -192,6 +192,26 @@ TEST_F(FlightProcessTest, PastTheLimitMallocReturnsNull) {
   EXPECT_THAT(said(*process), ElementsAre());
   EXPECT_EQ(process->heap().limit_bytes, 4096u);
   EXPECT_THROW(process->set_heap_limit(std::uint64_t{1} << 32), std::invalid_argument);
+}
+
+// Under a sanitizer: requested bytes, no tags; and a cap that can only end the process.
+TEST_F(FlightProcessTest, WhatASanitizerAllocatesIsAccountedFor) {
+  if (!heap_accounting_available()) GTEST_SKIP() << "heaps are simulated";
+  FlightProcessOptions o = options();
+  o.heap_bytes = 8192;
+  const auto process = created(o);
+  const std::uint64_t before = process->heap().resting_bytes;
+  tell(*process, allocate(1000));
+  EXPECT_EQ(process->call_record().resting_bytes, before + 1000);
+  tell(*process, allocate_briefly(500));
+  EXPECT_EQ(process->call_record().resting_bytes, before + 1000);
+  EXPECT_EQ(process->call_record().transient_peak_bytes, before + 1500);
+  tell(*process, order("z"));
+  EXPECT_EQ(process->heap().resting_bytes, before);
+  EXPECT_EQ(process->heap().high_water_bytes, before + 1500);
+  EXPECT_EQ(tell(*process, allocate(9000)), CallOutcome::kCrashed);
+  EXPECT_EQ(process->crash().kind, CrashKind::kHeapExhausted);
+  EXPECT_THAT(process->crash().message, HasSubstr("malloc of 9000 bytes would pass"));
 }
 
 TEST_F(FlightProcessTest, CopiesHaveGlobalsOfTheirOwn) {
@@ -257,6 +277,8 @@ TEST_F(FlightProcessTest, StaticDestructorsLeaveNothingBehind) {
   const auto process = created(options("flight_test_statics"));
   tell(*process, order("+"));
   EXPECT_EQ(process->shut_down(kTruth, 0), CallOutcome::kDone);
+  // Under a sanitizer the C library runs them, and not before the library is unloaded.
+  if (heap_accounting_available()) return;
   EXPECT_EQ(process->heap().live_blocks, 0u);  // what static constructors made included
 }
 
