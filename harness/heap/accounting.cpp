@@ -20,16 +20,14 @@ class AccountingHeap final : public BlockHeap {
 
   void charge(std::uint64_t bytes) {
     add_live(bytes);
-    ++live_blocks_;
     ++allocations_;
-    area_.top = area_.first + static_cast<Offset>(std::min(high_water_bytes_, kMaxLimit_bytes));
+    area_.top = area_.first + static_cast<Offset>(std::min(high_water_bytes(), kMaxLimit_bytes));
     if (live_bytes_ <= options_.limit_bytes) return;
     ++failures_;
     fail(HeapFault::Kind::kExhausted, nullptr, "malloc", bytes);
   }
   void credit(std::uint64_t bytes) {
     live_bytes_ -= bytes;
-    --live_blocks_;
     ++frees_;
   }
 

@@ -157,10 +157,10 @@ HeapFigures BlockHeap::figures() const {
   f.limit_bytes = options_.limit_bytes;
   f.alignment = options_.alignment;
   f.resting_bytes = live_bytes_;
-  f.payload_bytes = has_blocks_ ? live_bytes_ - kTags_bytes * live_blocks_ : live_bytes_;
-  f.live_blocks = live_blocks_;
+  f.live_blocks = allocations_ - frees_;
+  f.payload_bytes = live_bytes_ - (has_blocks_ ? kTags_bytes * f.live_blocks : 0);
   f.transient_peak_bytes = peak_bytes_;
-  f.high_water_bytes = high_water_bytes_;
+  f.high_water_bytes = high_water_bytes();
   f.heap_bytes = heap_bytes();
   f.largest_free_bytes = largest_free_bytes();
   f.free_list_length = free_list_length();

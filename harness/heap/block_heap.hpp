@@ -103,6 +103,7 @@ class BlockHeap {
   HeapFigures figures() const;
   std::uint64_t limit_bytes() const { return options_.limit_bytes; }
   std::uint64_t live_bytes() const { return live_bytes_; }
+  std::uint64_t high_water_bytes() const { return std::max(earlier_peak_bytes_, peak_bytes_); }
   std::uint64_t allocations() const { return allocations_; }
   std::uint64_t peak_since_mark_bytes() const { return peak_bytes_; }
   std::uint64_t heap_bytes() const { return area_.top - area_.first; }
@@ -110,7 +111,10 @@ class BlockHeap {
   virtual std::uint64_t largest_free_bytes() const = 0;
   virtual std::uint64_t free_list_length() const = 0;
   /// From here on, transient_peak_bytes starts at what is live.
-  void mark() { peak_bytes_ = live_bytes_; }
+  void mark() {
+    earlier_peak_bytes_ = high_water_bytes();
+    peak_bytes_ = live_bytes_;
+  }
 
   /// Visits every block and the list. True if all hold together; else false, and the handler was
   /// told of the first fault.
@@ -159,20 +163,19 @@ class BlockHeap {
 
   void count_allocation(Offset payload) {
     add_live(area_.size(payload));
-    ++live_blocks_;
     ++allocations_;
   }
   void add_live(std::uint64_t bytes) {
     live_bytes_ += bytes;
-    peak_bytes_ = std::max(peak_bytes_, live_bytes_);
-    high_water_bytes_ = std::max(high_water_bytes_, live_bytes_);
+    if (peak_bytes_ < live_bytes_) peak_bytes_ = live_bytes_;
   }
 
   internal::HeapArea area_;
   bool has_blocks_ = true;  // in the arena; else only counts are kept
   std::uint32_t least_;
-  std::uint64_t live_bytes_ = 0, peak_bytes_ = 0, high_water_bytes_ = 0;
-  std::uint64_t live_blocks_ = 0, allocations_ = 0, frees_ = 0, failures_ = 0, search_steps_ = 0;
+  std::uint64_t live_bytes_ = 0;
+  std::uint64_t peak_bytes_ = 0, earlier_peak_bytes_ = 0;  // since mark(), and before it
+  std::uint64_t allocations_ = 0, frees_ = 0, failures_ = 0, search_steps_ = 0;
   HeapOptions options_;
 
  private:

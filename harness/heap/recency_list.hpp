@@ -33,8 +33,7 @@ class RecencyList {
     const std::uint32_t slot = area_.word(block);
     if (slot >= end_ || area_.word(block + 4) != ~slot) return false;
     const Bucket& bucket = buckets_[slot / 64];
-    return (bucket.live >> (slot % 64) & 1) != 0 && bucket.block[slot % 64] == block &&
-           bucket.size[slot % 64] == size;
+    return bucket.block[slot % 64] == block && bucket.size[slot % 64] == size;
   }
 
   void insert(HeapOffset block, std::uint32_t size, bool /*at_top*/ = false) {
