@@ -34,4 +34,5 @@ install(FILES
   ${CMAKE_CURRENT_LIST_DIR}/OrreryDependencies.cmake
   ${CMAKE_CURRENT_LIST_DIR}/OrreryNumerics.cmake
   ${CMAKE_CURRENT_LIST_DIR}/OrreryUser.cmake
+  ${PROJECT_SOURCE_DIR}/flight_sw/abi/orrery_work.cpp
   DESTINATION ${orrery_package_dir})

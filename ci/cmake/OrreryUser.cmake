@@ -1,6 +1,6 @@
 # What a user calls. The same file serves the build tree, FetchContent and an installed Orrery.
 #
-#   orrery_add_flight_library(<name> SOURCES <file>... [LINK <target>...])
+#   orrery_add_flight_library(<name> SOURCES <file>... [LINK <target>...] [COUNT_WORK])
 #   orrery_add_test(<name> SOURCES <file>... FLIGHT <target>... [LINK <target>...]
 #                   [LABELS <label>...] [TIMEOUT <seconds>] [SHARDS <n>])
 include_guard(GLOBAL)
@@ -9,9 +9,10 @@ include_guard(GLOBAL)
 #
 # It sees orrery::flight_abi and LINK, and of the simulator nothing: including one of its headers is a
 # compile error. Hidden visibility leaves the entry point as the only exported symbol; asserts stay in
-# every build type. The property ORRERY_FLIGHT_LIBRARY of the target is TRUE.
+# every build type. With COUNT_WORK it counts the edges of its control flow (orrery_work.h), for work
+# budgets and modelled execution time. The property ORRERY_FLIGHT_LIBRARY of the target is TRUE.
 function(orrery_add_flight_library name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;LINK")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "COUNT_WORK" "" "SOURCES;LINK")
   orrery_check_arguments("orrery_add_flight_library(${name})" SOURCES)
   foreach(target IN LISTS arg_LINK)
     if(target MATCHES "^orrery(::|_)(kernel|models|harness|fixtures|allocator|main)$")
@@ -35,6 +36,9 @@ function(orrery_add_flight_library name)
     VISIBILITY_INLINES_HIDDEN ON
     POSITION_INDEPENDENT_CODE ON
     ORRERY_FLIGHT_LIBRARY TRUE)
+  if(arg_COUNT_WORK)
+    orrery_count_work(${name})
+  endif()
   orrery_refuse_undefined_symbols(${name})
   orrery_use_project_flags(${name})
 endfunction()
@@ -73,6 +77,20 @@ function(orrery_check_arguments call required)
   if(NOT arg_${required})
     message(FATAL_ERROR "${call}: ${required} is missing or empty")
   endif()
+endfunction()
+
+# The file of the counter lies beside this one where Orrery is installed.
+function(orrery_count_work name)
+  set(counter ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/orrery_work.cpp)
+  if(NOT EXISTS ${counter})
+    set(counter ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/../../flight_sw/abi/orrery_work.cpp)
+  endif()
+  target_sources(${name} PRIVATE ${counter})
+  target_compile_options(${name} PRIVATE
+    $<$<COMPILE_LANG_AND_ID:C,GNU>:-fsanitize-coverage=trace-pc>
+    $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-fsanitize-coverage=trace-pc>
+    $<$<COMPILE_LANG_AND_ID:C,Clang>:-fsanitize-coverage=edge,no-prune,trace-pc>
+    $<$<COMPILE_LANG_AND_ID:CXX,Clang>:-fsanitize-coverage=edge,no-prune,trace-pc>)
 endfunction()
 
 # A symbol that nobody defines would otherwise be found when the library is loaded, or when it is

@@ -5,17 +5,22 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <cxxabi.h>
 #include <exception>
+#include <fcntl.h>
 #include <mutex>
+#include <optional>
 #include <pthread.h>
 #include <setjmp.h>
 #include <signal.h>
 #include <stdexcept>
 #include <sys/mman.h>
+#include <sys/syscall.h>
+#include <time.h>
 #include <typeinfo>
 #include <unistd.h>
 #include <unwind.h>
@@ -42,6 +47,9 @@ struct RunningCall {
   ContainedProcess* process = nullptr;
   CrashCapture* capture = nullptr;
   const void* boundary = nullptr;  // on the stack: what lies above is the simulator's
+  void (*function)(void*) = nullptr;
+  void* argument = nullptr;
+  std::uint64_t serial = 0;
 };
 
 #define ORRERY_INITIAL_EXEC [[gnu::tls_model("initial-exec")]]
@@ -50,6 +58,10 @@ ORRERY_INITIAL_EXEC constinit thread_local RunningCall* running_call = nullptr;
 // Flight code is what runs now. volatile: read by the signal handler.
 ORRERY_INITIAL_EXEC constinit thread_local volatile bool in_flight_code = false;
 ORRERY_INITIAL_EXEC constinit thread_local volatile bool unwinding = false;
+ORRERY_INITIAL_EXEC constinit thread_local std::uint64_t last_serial = 0;
+
+// Whatever uses CPU time sends it; debuggers let it pass without a word.
+constexpr int kTimerSignal = SIGVTALRM;
 
 struct sigaction previous_actions[kSignals.size()];
 std::terminate_handler previous_terminate = nullptr;
@@ -104,6 +116,50 @@ std::uintptr_t instruction_of(void* context) {
 #endif
 }
 
+// A fault near the stack pointer, far below the boundary: where a process has no stack of its own.
+bool is_below_stack(const RunningCall& call, const void* address, void* context) {
+#if defined(__x86_64__)
+  constexpr std::uintptr_t kNear = 64 * 1024, kFar = 256 * 1024;
+  const auto pointer =
+      static_cast<std::uintptr_t>(static_cast<ucontext_t*>(context)->uc_mcontext.gregs[REG_RSP]);
+  const auto fault = reinterpret_cast<std::uintptr_t>(address);
+  return fault + kNear > pointer && fault < pointer + kNear &&
+         pointer + kFar < reinterpret_cast<std::uintptr_t>(call.boundary);
+#else
+  (void)call, (void)address, (void)context;
+  return false;
+#endif
+}
+
+bool is_stack_overflow(const RunningCall& call, int signal, const siginfo_t& info, void* context) {
+  if ((signal != SIGSEGV && signal != SIGBUS) || info.si_code <= 0) return false;
+  const FlightStack* stack = call.process->stack;
+  return stack != nullptr ? stack->guards(info.si_addr)
+                          : is_below_stack(call, info.si_addr, context);
+}
+
+CrashKind kind_of_signal(const RunningCall& call, int signal, const siginfo_t& info,
+                         void* context) {
+  char* message = call.capture->message;
+  constexpr std::size_t kSize = sizeof call.capture->message;
+  if (is_stack_overflow(call, signal, info, context)) {
+    char size[32] = "";
+    if (const FlightStack* stack = call.process->stack) {
+      std::snprintf(size, sizeof size, " of %llu bytes",
+                    static_cast<unsigned long long>(stack->bytes()));
+    }
+    std::snprintf(message, kSize, "the stack%s is used up: %s at address %p", size,
+                  sigdescr_np(signal), info.si_addr);
+    return CrashKind::kStackOverflow;
+  }
+  if (info.si_code > 0) {
+    std::snprintf(message, kSize, "%s at address %p", sigdescr_np(signal), info.si_addr);
+  } else {
+    std::snprintf(message, kSize, "%s raised", sigdescr_np(signal));
+  }
+  return signal == SIGABRT ? CrashKind::kAbort : CrashKind::kSignal;
+}
+
 // Not ours: as if this handler had never been there.
 void pass_on(int signal, const siginfo_t& info) {
   for (std::size_t i = 0; i < kSignals.size(); ++i) {
@@ -124,16 +180,79 @@ void on_signal(int signal, siginfo_t* info, void* context) {
     pass_on(signal, *info);
     return;
   }
-  if (info->si_code > 0) {
-    std::snprintf(call->capture->message, sizeof call->capture->message, "%s at address %p",
-                  sigdescr_np(signal), info->si_addr);
-  } else {
-    std::snprintf(call->capture->message, sizeof call->capture->message, "%s raised",
-                  sigdescr_np(signal));
-  }
-  leave(*call, signal == SIGABRT ? CrashKind::kAbort : CrashKind::kSignal, signal,
-        instruction_of(context));
+  leave(*call, kind_of_signal(*call, signal, *info, context), signal, instruction_of(context));
 }
+
+// ---- the limit of host time
+
+std::int64_t cpu_time_ns() {
+  timespec t{};
+  syscall(SYS_clock_gettime, CLOCK_THREAD_CPUTIME_ID, &t);
+  return std::int64_t{1'000'000'000} * t.tv_sec + t.tv_nsec;
+}
+
+// Asked in a signal handler. A debugger may have come at any time.
+bool is_traced() {
+  char text[4096];
+  const int file = open("/proc/self/status", O_RDONLY | O_CLOEXEC);
+  if (file < 0) return false;
+  const ssize_t bytes = read(file, text, sizeof text - 1);
+  close(file);
+  text[std::max<ssize_t>(bytes, 0)] = 0;
+  const char* line = std::strstr(text, "TracerPid:");
+  return line != nullptr && std::strtol(line + std::strlen("TracerPid:"), nullptr, 10) != 0;
+}
+
+bool under_valgrind() {
+  const char* preload = std::getenv("LD_PRELOAD");
+  return preload != nullptr && std::strstr(preload, "vgpreload") != nullptr;
+}
+
+struct WatchedCall {
+  std::uint64_t serial = 0;
+  std::int64_t since_ns = 0;
+};
+ORRERY_INITIAL_EXEC constinit thread_local WatchedCall watched;
+
+// Every 0.1 s of this thread's CPU time: is it still the same call? So a call costs nothing.
+void on_timer(int, siginfo_t*, void* context) {
+  const int kept = errno;
+  RunningCall* call = running_call;
+  const bool limited = call != nullptr && in_flight_code && call->process->host_limit_ns > 0;
+  if (limited && call->serial != watched.serial) {
+    watched = {call->serial, cpu_time_ns()};
+  } else if (limited && cpu_time_ns() - watched.since_ns >= call->process->host_limit_ns &&
+             !is_traced()) {
+    std::snprintf(call->capture->message, sizeof call->capture->message,
+                  "the call used more than %.3f s of CPU time: an endless loop?",
+                  1e-9 * static_cast<double>(call->process->host_limit_ns));
+    leave(*call, CrashKind::kTimeout, 0, instruction_of(context));
+  }
+  errno = kept;
+}
+
+class CallTimer {
+ public:
+  CallTimer() {
+    if (under_valgrind()) return;
+    sigevent event{};
+    event.sigev_notify = SIGEV_THREAD_ID;
+    event.sigev_signo = kTimerSignal;
+    event._sigev_un._tid = static_cast<pid_t>(syscall(SYS_gettid));
+    works_ = timer_create(CLOCK_THREAD_CPUTIME_ID, &event, &timer_) == 0;
+    const itimerspec period = {{0, 100'000'000}, {0, 100'000'000}};
+    if (works_) timer_settime(timer_, 0, &period, nullptr);
+  }
+  ~CallTimer() {
+    if (works_) timer_delete(timer_);
+  }
+  CallTimer(const CallTimer&) = delete;
+  CallTimer& operator=(const CallTimer&) = delete;
+
+ private:
+  timer_t timer_{};
+  bool works_ = false;
+};
 
 // "std::runtime_error: no fix"; the object is flight code's, so it is asked as flight code.
 void describe_exception(char* text, std::size_t size) {
@@ -208,6 +327,11 @@ void install_once() {
     for (std::size_t i = 0; i < kSignals.size(); ++i) {
       sigaction(kSignals[i], &action, &previous_actions[i]);
     }
+    struct sigaction timer {};
+    timer.sa_sigaction = on_timer;
+    timer.sa_flags = SA_SIGINFO | SA_ONSTACK | SA_NODEFER | SA_RESTART;
+    sigemptyset(&timer.sa_mask);
+    sigaction(kTimerSignal, &timer, nullptr);
     previous_terminate = std::set_terminate(on_terminate);
     process_hooks = &kProcessHooks;
   });
@@ -225,6 +349,7 @@ class SignalStack {
     stack.ss_sp = memory_;
     stack.ss_size = kBytes;
     sigaltstack(&stack, &previous_);
+    timer_.emplace();  // now that its handler is there
     pthread_sigmask(SIG_SETMASK, nullptr, &mask_);
   }
   ~SignalStack() {
@@ -238,6 +363,7 @@ class SignalStack {
   void* memory_;
   stack_t previous_{};
   sigset_t mask_;
+  std::optional<CallTimer> timer_;
 };
 
 SignalStack& signal_stack_of_this_thread() {
@@ -255,18 +381,22 @@ struct ExceptionState {
 };
 
 // An exception that gets here ends the process where it was thrown.
-[[gnu::noinline]] void call_as_flight_code(RunningCall& call, void (*function)(void*),
-                                           void* argument) noexcept {
+[[gnu::noinline]] void call_as_flight_code(void* running) noexcept {
+  RunningCall& call = *static_cast<RunningCall*>(running);
   call.boundary = __builtin_frame_address(0);
   in_flight_code = true;
-  function(argument);
+  call.function(call.argument);
   in_flight_code = false;
 }
 
 // Apart, so that no variable of a caller lives across the jump. True if the function returned.
-[[gnu::noinline]] bool call_or_crash(RunningCall& call, void (*function)(void*), void* argument) {
+[[gnu::noinline]] bool call_or_crash(RunningCall& call) {
   if (sigsetjmp(call.jump, 0) != 0) return false;
-  call_as_flight_code(call, function, argument);
+  if (call.process->stack != nullptr) {
+    call.process->stack->call(call_as_flight_code, &call);
+  } else {
+    call_as_flight_code(&call);
+  }
   return true;
 }
 
@@ -285,6 +415,9 @@ bool run_contained(ContainedProcess& process, void (*function)(void*), void* arg
   RunningCall call;
   call.process = &process;
   call.capture = &capture;
+  call.function = function;
+  call.argument = argument;
+  call.serial = ++last_serial;
   capture.message[0] = 0;
 
   running_call = &call;
@@ -295,7 +428,7 @@ bool run_contained(ContainedProcess& process, void (*function)(void*), void* arg
 #ifdef ORRERY_LEAK_SANITIZER
     __lsan_disable();  // what a dead process had allocated is not a leak
 #endif
-    returned = call_or_crash(call, function, argument);
+    returned = call_or_crash(call);
 #ifdef ORRERY_LEAK_SANITIZER
     __lsan_enable();
 #endif

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <orrery/harness/flight/crash_report.hpp>
+#include <orrery/harness/flight/flight_stack.hpp>
 #include <orrery/harness/heap/simulated_heap.hpp>
 
 #include <cstdint>
@@ -28,8 +29,10 @@ struct ExitFunction {
 
 /// The part of a process that the boundary needs.
 struct ContainedProcess {
-  const char* name = "";          // "dsc/gnc", for debuggers
-  SimulatedHeap* heap = nullptr;  // null: the system's
+  const char* name = "";           // "dsc/gnc", for debuggers
+  SimulatedHeap* heap = nullptr;   // null: the system's
+  FlightStack* stack = nullptr;    // null: the caller's
+  std::int64_t host_limit_ns = 0;  // of thread CPU time in one call; 0: none
   std::vector<ExitFunction> exit_functions;
   bool changed_floating_point = false;  // set when a call left the control registers changed
 };
@@ -37,8 +40,11 @@ struct ContainedProcess {
 /// Runs function(argument) as flight code. True if it returned; false if it crashed, and then
 /// `capture` tells how: its frames are gone, no destructor of them ran.
 ///
-/// Saved and restored: current heap, sim_process, MXCSR and x87 control word; after a crash the
-/// signal mask and the exception state of the thread as well.
+/// A call that uses up its limit of CPU time ends as CrashKind::kTimeout, at most 0.1 s of CPU time
+/// later; not under a debugger or valgrind. It may leave locks of the C library held.
+///
+/// Saved and restored: current heap, stack, sim_process, MXCSR and x87 control word; after a crash
+/// the signal mask and the exception state of the thread as well.
 /// @throws std::logic_error  flight code is running already: calls do not nest.
 bool run_contained(ContainedProcess& process, void (*function)(void*), void* argument,
                    CrashCapture& capture);

@@ -63,6 +63,12 @@ const char* to_string(CrashKind kind) {
       return "heap exhausted";
     case CrashKind::kNoProgress:
       return "no progress";
+    case CrashKind::kStackOverflow:
+      return "stack overflow";
+    case CrashKind::kWorkBudget:
+      return "work budget exceeded";
+    case CrashKind::kTimeout:
+      return "timeout";
   }
   return "unknown crash";
 }

@@ -11,7 +11,7 @@
 namespace orrery {
 
 enum class CrashKind : std::uint8_t {
-  kSignal,         // SIGSEGV, SIGBUS, SIGFPE, SIGILL; a stack overflow is a SIGSEGV
+  kSignal,         // SIGSEGV, SIGBUS, SIGFPE, SIGILL
   kAbort,          // abort(), a failed assert
   kException,      // an exception that nothing in the library caught
   kExit,           // exit()
@@ -21,6 +21,9 @@ enum class CrashKind : std::uint8_t {
   kHeapFault,      // HeapFault: double free, overwritten header, write after free ...
   kHeapExhausted,  // passed the cap, with HeapExhaustion::kCrash
   kNoProgress,     // its tick fired over and over at one instant
+  kStackOverflow,  // passed the end of its stack
+  kWorkBudget,     // counted more work in one call than it may (COUNT_WORK)
+  kTimeout,        // one call used up its limit of the host's time: no two hosts agree on it
 };
 const char* to_string(CrashKind kind);
 

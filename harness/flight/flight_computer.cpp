@@ -534,6 +534,9 @@ std::uint64_t FlightComputer::dropped(std::string_view port) const {
 HeapFigures FlightComputer::heap() const {
   return impl_->heap();
 }
+std::uint64_t FlightComputer::stack_high_water_bytes() const {
+  return impl_->process == nullptr ? 0 : impl_->process->stack_high_water_bytes();
+}
 void FlightComputer::set_heap_limit(std::uint64_t bytes) {
   if (impl_->process != nullptr) impl_->process->set_heap_limit(bytes);
   impl_->options.heap_bytes = bytes;

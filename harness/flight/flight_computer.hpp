@@ -85,6 +85,7 @@ class FlightComputer {
   std::uint64_t dropped(std::string_view port) const;
 
   HeapFigures heap() const;
+  std::uint64_t stack_high_water_bytes() const;  // of this life
   /// @throws std::invalid_argument  above 4 GiB less 1 MiB.
   void set_heap_limit(std::uint64_t bytes);
   /// A sample per call; empty where heaps are not simulated.

@@ -33,8 +33,13 @@ struct FlightProcessOptions {
   HeapRules heap = {};                    // policy, checks
   HeapExhaustion heap_exhaustion = HeapExhaustion::kNull;
   std::uint64_t storage_bytes = 1'048'576;  // non-volatile, all slots together
-  Duration execution_time{0};               // of every call; outputs leave when it has passed
-  RandomStreams* random = nullptr;          // of the run; null: a set of the process's own
+  std::uint64_t stack_bytes = 1'048'576;    // 64 KiB ... 32 MiB; see FlightStack::available()
+  /// Edges of control flow that one call may take, counted by a library that was built with
+  /// COUNT_WORK; 0: any number. Past it the process ends, at the same instruction in every run.
+  std::uint64_t work_budget = 0;
+  Duration host_time_limit{10'000'000'000};  // of CPU time in one call, the last resort; 0: none
+  Duration execution_time{0};                // of every call; outputs leave when it has passed
+  RandomStreams* random = nullptr;           // of the run; null: a set of the process's own
   bool clock_keeps_power = false;  // false: after a power cycle the clock starts at its zero
 };
 

@@ -26,6 +26,21 @@ void check_name(const char* what, const std::string& name) {
   }
 }
 
+void check_limits(const FlightProcessOptions& options) {
+  using internal::FlightStack;
+  if (options.stack_bytes < FlightStack::kLeast_bytes ||
+      options.stack_bytes > FlightStack::kMost_bytes) {
+    throw std::invalid_argument(
+        "FlightProcess: stack_bytes = " + std::to_string(options.stack_bytes) + "; it is " +
+        std::to_string(FlightStack::kLeast_bytes) + " to " +
+        std::to_string(FlightStack::kMost_bytes));
+  }
+  if (options.host_time_limit < Duration{0}) {
+    throw std::invalid_argument("FlightProcess: host_time_limit = " +
+                                to_string(options.host_time_limit) + "; it is 0 (none) or more");
+  }
+}
+
 HeapOptions heap_options(const FlightProcessOptions& options) {
   return {.alignment = options.heap_alignment,
           .limit_bytes = options.heap_bytes,
@@ -39,6 +54,7 @@ FlightProcess::Impl::Impl(FlightProcessOptions o) : options(std::move(o)) {
   check_name("process", options.process);
   // Also where heaps are not simulated: a mistake must not show under one preset only.
   check_heap_options("FlightProcess", heap_options(options));
+  check_limits(options);
   name = process_name(options);
   contained_.name = name.c_str();
   if (internal::call_in_progress()) {
@@ -50,6 +66,11 @@ FlightProcess::Impl::Impl(FlightProcessOptions o) : options(std::move(o)) {
     if (options.isolation == Isolation::kShared) heap->take_others_blocks();
     contained_.heap = heap.get();
   }
+  if (internal::FlightStack::available()) {
+    stack = std::make_unique<internal::FlightStack>(options.stack_bytes);
+    contained_.stack = stack.get();
+  }
+  contained_.host_limit_ns = to_ns(options.host_time_limit);
   fill_host_table();
   load();
 }
@@ -65,6 +86,7 @@ void FlightProcess::Impl::load() {
         "it does not export orrery_flight_entry, by which flight software is entered; is it linked "
         "from orrery_flight.h, and with that symbol visible?");
   }
+  find_work_counter();
   begin_call();
   arguments_ = CallArguments{};
   if (!internal::run_contained(
@@ -82,6 +104,17 @@ void FlightProcess::Impl::load() {
     refuse(error.what());
   }
   input_.reserve(64);  // never a null pointer, of an empty message either
+}
+
+void FlightProcess::Impl::find_work_counter() {
+  using Counter = orrery_work* (*)();
+  if (void* counter = library->symbol("orrery_work_counter")) {
+    work = reinterpret_cast<Counter>(counter)();
+  } else if (options.work_budget != 0) {
+    throw std::invalid_argument("flight library \"" + options.library + "\" (" + library->path() +
+                                "): a work budget needs a library that counts its work; build it "
+                                "with orrery_add_flight_library(... COUNT_WORK)");
+  }
 }
 
 FlightProcess::Impl::~Impl() {
@@ -178,6 +211,13 @@ void FlightProcess::Impl::begin_call() {
   logs.clear();
   log_text.clear();
   tick_request.reset();
+  if (work != nullptr) {
+    work->count = 0;
+    work->limit = options.work_budget == 0 ? UINT64_MAX : options.work_budget;
+    work->exceeded = [] {
+      internal::end_running_call(CrashKind::kWorkBudget, "the call took more edges than it may");
+    };
+  }
   if (heap != nullptr) {
     heap->blocks().mark();
     allocations_before_ = heap->blocks().allocations();
@@ -226,7 +266,9 @@ void FlightProcess::Impl::die(CrashKind kind, std::string message, SimTime truth
   crash.t = truth;
   crash.onboard_ns = arguments.onboard_ns;
   crash.kind = kind;
-  crash.signal = kind == CrashKind::kSignal || kind == CrashKind::kAbort ? capture_.signal : 0;
+  const bool raised = kind == CrashKind::kSignal || kind == CrashKind::kAbort ||
+                      kind == CrashKind::kStackOverflow;
+  crash.signal = raised ? capture_.signal : 0;
   crash.status = arguments.status;
   crash.message = std::move(message);
   crash.call = call_name(arguments.call);
@@ -235,6 +277,7 @@ void FlightProcess::Impl::die(CrashKind kind, std::string message, SimTime truth
     crash.port = arguments.port->name;
     crash.input = input_;
   }
+  if (work != nullptr) crash.work = work->count;
   crash.backtrace = internal::stack_frames(capture_, library->loaded_path());
   capture_.frame_count = 0;
   if (kind == CrashKind::kHeapFault) tell_of_block(fault_address_);
@@ -437,6 +480,15 @@ const CrashReport& FlightProcess::crash() const {
 
 HeapFigures FlightProcess::heap() const {
   return impl_->heap == nullptr ? HeapFigures{} : impl_->heap->blocks().figures();
+}
+std::uint64_t FlightProcess::stack_high_water_bytes() const {
+  return impl_->stack == nullptr ? 0 : impl_->stack->high_water_bytes();
+}
+std::uint64_t FlightProcess::work() const {
+  return impl_->work == nullptr ? 0 : impl_->work->count;
+}
+bool FlightProcess::counts_work() const {
+  return impl_->work != nullptr;
 }
 void FlightProcess::set_heap_limit(std::uint64_t bytes) {
   FlightProcessOptions changed = impl_->options;

@@ -118,6 +118,10 @@ class FlightProcess {
   void end(CrashKind kind, const std::string& message, SimTime truth, std::int64_t onboard_ns);
 
   HeapFigures heap() const;
+  /// Most of its stack that it has used; 0 where it has none of its own.
+  std::uint64_t stack_high_water_bytes() const;
+  std::uint64_t work() const;  // edges that the last call took, where the library counts them
+  bool counts_work() const;    // the library was built with COUNT_WORK
   /// Below what the heap already has is allowed: it stops growing.
   /// @throws std::invalid_argument  above 4 GiB less 1 MiB.
   void set_heap_limit(std::uint64_t bytes);

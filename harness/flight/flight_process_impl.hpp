@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <memory>
 #include <orrery_flight.h>
+#include <orrery_work.h>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -60,8 +61,10 @@ class FlightProcess::Impl {
   std::string name;
   std::vector<FlightPort> ports;
   const orrery_flight* flight = nullptr;
-  std::unique_ptr<SimulatedHeap> heap;     // null where heaps are not simulated
-  std::unique_ptr<FlightLibrary> library;  // unloaded while the heap is still there
+  std::unique_ptr<SimulatedHeap> heap;           // null where heaps are not simulated
+  std::unique_ptr<internal::FlightStack> stack;  // null: calls run on the caller's
+  std::unique_ptr<FlightLibrary> library;        // unloaded while heap and stack are still there
+  orrery_work* work = nullptr;                   // of the library; null: it counts none
 
   bool created = false, alive = false;
   bool crashed = false;  // or cut off: its destructors never run
@@ -87,6 +90,7 @@ class FlightProcess::Impl {
 
  private:
   void load();
+  void find_work_counter();
   void fill_host_table();
   void begin_call();
   void end_call(SimTime truth);

@@ -1,6 +1,7 @@
 // Property: whatever flight code does wrong ends its process, and nothing else.
 
 #include <orrery/harness/flight/flight_process.hpp>
+#include <orrery/harness/flight/flight_stack.hpp>
 #include <orrery/harness/flight/floating_point.hpp>
 #include <orrery/harness/heap/simulated_heap.hpp>
 #include <orrery/harness/kernel/sim_state.hpp>
@@ -10,8 +11,10 @@
 
 #include <csignal>
 #include <cstdint>
+#include <cstring>
 #include <exception>
 #include <memory>
+#include <stdexcept>
 #include <string>
 
 #include "orders.hpp"
@@ -108,7 +111,8 @@ INSTANTIATE_TEST_SUITE_P(
               "fault"},
         Fault{"IllegalInstruction", "!i", CrashKind::kSignal, SIGILL, "llegal instruction",
               "fault"},
-        Fault{"StackOverflow", "!o", CrashKind::kSignal, SIGSEGV, "egmentation fault", "overflow"},
+        Fault{"StackOverflow", "!o", CrashKind::kStackOverflow, SIGSEGV, "is used up: Segmentation",
+              "overflow"},
         Fault{"Raise", "!r", CrashKind::kSignal, SIGSEGV, "raised", "fault"},
         Fault{"Abort", "!a", CrashKind::kAbort, SIGABRT, "Aborted", "fault"},
         Fault{"Assert", "!v", CrashKind::kAbort, SIGABRT, "Aborted", "fault"},
@@ -119,6 +123,91 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{"OverwrittenHeader", "!c", CrashKind::kHeapFault, 0, "overwritten block", "fault",
               true}),
     [](const auto& fault) { return std::string(fault.param.name); });
+
+// 3 frames of 4 kB and what is around them; the figure is that of the deepest call.
+TEST(ContainmentTest, StackHighWaterIsThatOfTheDeepestCall) {
+  if (!internal::FlightStack::available()) GTEST_SKIP() << "calls run on the caller's stack";
+  FlightProcessOptions o = options();
+  o.stack_bytes = 128 * 1024;
+  const auto process = created(o);
+  tell(*process, order("eping"));
+  const std::uint64_t shallow = process->stack_high_water_bytes();
+  EXPECT_GT(shallow, 0u);
+  EXPECT_LT(shallow, 16'000u);
+  EXPECT_EQ(tell(*process, order("!o")), CallOutcome::kCrashed);
+  EXPECT_THAT(process->crash().message, HasSubstr("the stack of 131072 bytes"));
+  EXPECT_GT(process->stack_high_water_bytes(), 131'072u - 3 * 4096u);
+  EXPECT_LE(process->stack_high_water_bytes(), 131'072u);
+}
+
+TEST(ContainmentTest, StacksOutsideTheirRangeAreRefused) {
+  for (const std::uint64_t bytes : {0u, 65'535u, 33'554'433u}) {
+    FlightProcessOptions o = options();
+    o.stack_bytes = bytes;
+    EXPECT_THROW(FlightProcess process(o), std::invalid_argument) << bytes;
+  }
+}
+
+TEST(ContainmentTest, EndlessLoopRunsIntoTheLimitOfHostTime) {
+  FlightProcessOptions o = options();
+  o.host_time_limit = 200ms;
+  const auto process = created(o);
+  EXPECT_EQ(tell(*process, order("!l")), CallOutcome::kCrashed);
+  EXPECT_EQ(process->crash().kind, CrashKind::kTimeout);
+  EXPECT_THAT(process->crash().message, HasSubstr("more than 0.200 s of CPU time"));
+  EXPECT_THAT(process->crash().backtrace,
+              testing::Contains(testing::Field(&StackFrame::function, HasSubstr("fault"))));
+  expect_simulator_unharmed();
+}
+
+// A turn of the loop is a fixed number of edges: so the count is linear, and repeats exactly.
+TEST(WorkTest, IsCountedExactlyAndLinearInWhatIsDone) {
+  const auto process = created(options("flight_test_worker"));
+  ASSERT_TRUE(process->counts_work());
+  const auto work_of = [&process](std::uint32_t turns) {
+    ByteBuffer message(4);
+    std::memcpy(message.data(), &turns, 4);
+    EXPECT_EQ(tell(*process, message), CallOutcome::kDone);
+    return process->work();
+  };
+  const std::uint64_t none = work_of(0), ten = work_of(10), million = work_of(1'000'000);
+  EXPECT_GT(ten, none);
+  EXPECT_EQ((ten - none) % 10, 0u);
+  EXPECT_EQ(million - none, (ten - none) * 100'000);
+  EXPECT_EQ(work_of(1'000'000), million);
+  EXPECT_FALSE(created(options())->counts_work());
+}
+
+TEST(WorkTest, BudgetEndsAnEndlessLoopAtTheSameEdgeEveryTime) {
+  FlightProcessOptions o = options("flight_test_worker");
+  o.work_budget = 1'000'000;
+  std::string first;
+  for (int i = 0; i < 3; ++i) {
+    const auto process = created(o);
+    EXPECT_EQ(tell(*process, ByteBuffer(4, std::byte{0xff})), CallOutcome::kCrashed);
+    EXPECT_EQ(process->crash().kind, CrashKind::kWorkBudget);
+    EXPECT_EQ(process->crash().work, 1'000'000u);
+    EXPECT_THAT(process->crash().backtrace,
+                testing::Contains(testing::Field(&StackFrame::function, HasSubstr("input"))));
+    const std::string stack = to_string(process->crash());
+    if (i > 0) {
+      EXPECT_EQ(stack.size(), first.size());
+    }
+    first = stack;
+  }
+  expect_simulator_unharmed();
+}
+
+TEST(WorkTest, BudgetNeedsALibraryThatCounts) {
+  FlightProcessOptions o = options();
+  o.work_budget = 1;
+  try {
+    FlightProcess process(o);
+    ADD_FAILURE() << "no exception";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("COUNT_WORK"));
+  }
+}
 
 TEST(ContainmentTest, StatusesThatEndAProcessAreCrashes) {
   for (const auto& [status, kind] :

@@ -63,6 +63,10 @@ NOINLINE __attribute__((no_sanitize("undefined"))) static void fault(char how) {
     case 'o':
       zero = overflow(local);
       break;
+    case 'l':
+      for (;;) {
+        zero = 0;
+      }
     case 'a':
       abort();
       break;
