@@ -1,5 +1,6 @@
 #include <orrery/harness/flight/containment.hpp>
 #include <orrery/harness/flight/floating_point.hpp>
+#include <orrery/harness/flight/virtual_services.hpp>
 #include <orrery/harness/heap/interposition.hpp>
 #include <orrery/harness/kernel/sim_state.hpp>
 
@@ -334,6 +335,7 @@ void install_once() {
     sigaction(kTimerSignal, &timer, nullptr);
     previous_terminate = std::set_terminate(on_terminate);
     process_hooks = &kProcessHooks;
+    install_service_hooks();
   });
 }
 
@@ -448,6 +450,10 @@ bool run_contained(ContainedProcess& process, void (*function)(void*), void* arg
 
 bool call_in_progress() {
   return running_call != nullptr;
+}
+
+bool flight_code_is_running() {
+  return running_call != nullptr && in_flight_code;
 }
 
 ContainedProcess* running_process() {

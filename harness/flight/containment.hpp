@@ -21,6 +21,8 @@ struct CrashCapture {
   int frame_count = 0;
 };
 
+class VirtualServices;
+
 /// A function that a library wants called at the end of its process.
 struct ExitFunction {
   void (*function)(void*) = nullptr;
@@ -29,10 +31,11 @@ struct ExitFunction {
 
 /// The part of a process that the boundary needs.
 struct ContainedProcess {
-  const char* name = "";           // "dsc/gnc", for debuggers
-  SimulatedHeap* heap = nullptr;   // null: the system's
-  FlightStack* stack = nullptr;    // null: the caller's
-  std::int64_t host_limit_ns = 0;  // of thread CPU time in one call; 0: none
+  const char* name = "";                // "dsc/gnc", for debuggers
+  SimulatedHeap* heap = nullptr;        // null: the system's
+  FlightStack* stack = nullptr;         // null: the caller's
+  VirtualServices* services = nullptr;  // null: the host's
+  std::int64_t host_limit_ns = 0;       // of thread CPU time in one call; 0: none
   std::vector<ExitFunction> exit_functions;
   bool changed_floating_point = false;  // set when a call left the control registers changed
 };
@@ -51,6 +54,9 @@ bool run_contained(ContainedProcess& process, void (*function)(void*), void* arg
 
 /// True while run_contained is on this thread's stack, callbacks included.
 bool call_in_progress();
+
+/// True if what runs now is flight code, and not the simulator that it called.
+bool flight_code_is_running();
 
 /// The process whose call is on this thread's stack, or null.
 ContainedProcess* running_process();

@@ -67,6 +67,8 @@ const char* to_string(CrashKind kind) {
       return "stack overflow";
     case CrashKind::kWorkBudget:
       return "work budget exceeded";
+    case CrashKind::kForbiddenCall:
+      return "forbidden call";
     case CrashKind::kTimeout:
       return "timeout";
   }

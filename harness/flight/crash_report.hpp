@@ -23,6 +23,7 @@ enum class CrashKind : std::uint8_t {
   kNoProgress,     // its tick fired over and over at one instant
   kStackOverflow,  // passed the end of its stack
   kWorkBudget,     // counted more work in one call than it may (COUNT_WORK)
+  kForbiddenCall,  // called what flight code must not: a thread, or with HostServices::kStrict
   kTimeout,        // one call used up its limit of the host's time: no two hosts agree on it
 };
 const char* to_string(CrashKind kind);

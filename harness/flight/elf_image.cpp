@@ -85,18 +85,74 @@ std::uint64_t ElfImage::file_offset(std::uint64_t address) const {
   throw std::invalid_argument("its dynamic section points outside the file");
 }
 
-std::vector<std::string> ElfImage::needed() const {
-  std::vector<std::uint64_t> names;
-  std::uint64_t strings = 0;
+std::uint64_t ElfImage::dynamic_strings() const {
   for (std::uint64_t i = 0; i < dynamic_count_; ++i) {
     const auto entry = read<Elf64_Dyn>(dynamic_offset_ + i * sizeof(Elf64_Dyn));
     if (entry.d_tag == DT_NULL) break;
-    if (entry.d_tag == DT_NEEDED) names.push_back(entry.d_un.d_val);
-    if (entry.d_tag == DT_STRTAB) strings = file_offset(entry.d_un.d_ptr);
+    if (entry.d_tag == DT_STRTAB) return file_offset(entry.d_un.d_ptr);
   }
+  throw std::invalid_argument("its dynamic section has no table of names");
+}
+
+std::vector<std::string> ElfImage::needed() const {
   std::vector<std::string> result;
-  for (const std::uint64_t name : names) result.push_back(text(strings + name));
+  for (std::uint64_t i = 0; i < dynamic_count_; ++i) {
+    const auto entry = read<Elf64_Dyn>(dynamic_offset_ + i * sizeof(Elf64_Dyn));
+    if (entry.d_tag == DT_NULL) break;
+    if (entry.d_tag == DT_NEEDED) result.push_back(text(dynamic_strings() + entry.d_un.d_val));
+  }
   return result;
+}
+
+std::string ElfImage::dynamic_text(std::int64_t tag) const {
+  for (std::uint64_t i = 0; i < dynamic_count_; ++i) {
+    const auto entry = read<Elf64_Dyn>(dynamic_offset_ + i * sizeof(Elf64_Dyn));
+    if (entry.d_tag == DT_NULL) break;
+    if (entry.d_tag == tag) return text(dynamic_strings() + entry.d_un.d_val);
+  }
+  return "";
+}
+
+std::string ElfImage::soname() const {
+  return dynamic_text(DT_SONAME);
+}
+
+std::string ElfImage::run_path() const {
+  const std::string path = dynamic_text(DT_RUNPATH);
+  return path.empty() ? dynamic_text(DT_RPATH) : path;
+}
+
+// Places in the file: of DT_NEEDED and DT_SONAME, and of the libraries whose symbol versions it
+// needs.
+std::vector<std::uint64_t> ElfImage::library_names() const {
+  std::vector<std::uint64_t> places;
+  const std::uint64_t strings = dynamic_strings();
+  for (std::uint64_t i = 0; i < dynamic_count_; ++i) {
+    const auto entry = read<Elf64_Dyn>(dynamic_offset_ + i * sizeof(Elf64_Dyn));
+    if (entry.d_tag == DT_NULL) break;
+    if (entry.d_tag == DT_NEEDED || entry.d_tag == DT_SONAME) {
+      places.push_back(strings + entry.d_un.d_val);
+    }
+    if (entry.d_tag != DT_VERNEED) continue;
+    for (std::uint64_t place = file_offset(entry.d_un.d_ptr);;) {
+      const auto version = read<Elf64_Verneed>(place);
+      places.push_back(strings + version.vn_file);
+      if (version.vn_next == 0) break;
+      place += version.vn_next;
+    }
+  }
+  return places;
+}
+
+void ElfImage::rename_libraries(const std::map<std::string, std::string>& names) {
+  for (const std::uint64_t place : library_names()) {
+    const auto change = names.find(text(place));  // not again where two places share a string
+    if (change == names.end()) continue;
+    if (change->second.size() != change->first.size()) {
+      throw std::invalid_argument("a library's name cannot change its length: " + change->second);
+    }
+    for (std::size_t i = 0; i < change->second.size(); ++i) write(place + i, change->second[i]);
+  }
 }
 
 std::vector<std::string> ElfImage::make_unique_symbols_weak() {
@@ -155,16 +211,42 @@ LifeFunctions ElfImage::detach_life_functions() {
   return found;
 }
 
-std::string ElfImage::function_at(std::uint64_t address) const {
+std::string ElfImage::symbol_at(std::uint64_t address, unsigned char type) const {
   const SymbolTable& table = all_symbols_.count != 0 ? all_symbols_ : dynamic_symbols_;
   for (std::uint64_t i = 0; i < table.count; ++i) {
     const auto symbol = read<Elf64_Sym>(table.offset + i * sizeof(Elf64_Sym));
-    if (ELF64_ST_TYPE(symbol.st_info) != STT_FUNC || symbol.st_shndx == SHN_UNDEF) continue;
+    if (ELF64_ST_TYPE(symbol.st_info) != type || symbol.st_shndx == SHN_UNDEF) continue;
     if (address >= symbol.st_value && address - symbol.st_value < symbol.st_size) {
       return text(table.strings + symbol.st_name);
     }
   }
   return "";
+}
+
+std::string ElfImage::function_at(std::uint64_t address) const {
+  return symbol_at(address, STT_FUNC);
+}
+
+std::string ElfImage::variable_at(std::uint64_t address) const {
+  return symbol_at(address, STT_OBJECT);
+}
+
+std::vector<ElfImage::AddressRange> ElfImage::writable_data() const {
+  const Elf64_Ehdr header = read<Elf64_Ehdr>(0);
+  std::vector<AddressRange> data;
+  AddressRange relro;
+  for (unsigned i = 0; i < header.e_phnum; ++i) {
+    const auto segment = read<Elf64_Phdr>(header.e_phoff + i * sizeof(Elf64_Phdr));
+    const AddressRange range{segment.p_vaddr, segment.p_vaddr + segment.p_memsz};
+    if (segment.p_type == PT_GNU_RELRO) relro = range;
+    if (segment.p_type == PT_LOAD && (segment.p_flags & PF_W) != 0) data.push_back(range);
+  }
+  for (AddressRange& range : data) {  // linkers put it at the beginning
+    if (relro.begin <= range.begin && relro.end > range.begin) {
+      range.begin = relro.end < range.end ? relro.end : range.end;
+    }
+  }
+  return data;
 }
 
 }  // namespace orrery::internal

@@ -5,6 +5,7 @@
 #include <orrery/harness/kernel/bytes.hpp>
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,12 @@ class ElfImage {
   const ByteBuffer& bytes() const { return file_; }
   /// Libraries that it names as needed.
   std::vector<std::string> needed() const;
+  /// Its own name for others, "" if it has none.
+  std::string soname() const;
+  /// DT_RUNPATH, else DT_RPATH: folders separated by colons, as written.
+  std::string run_path() const;
+  /// Changes names of libraries, its own or needed, to others of the same length.
+  void rename_libraries(const std::map<std::string, std::string>& names);
 
   /// Symbols that g++ marks as one per program (statics of inline functions, inline variables)
   /// would be one for all copies, and keep a copy loaded for ever. As weak ones each copy has its
@@ -38,6 +45,13 @@ class ElfImage {
   /// Name of the function that contains an address (before relocation), "" if the file does not
   /// tell. Uses the full symbol table where it was not stripped.
   std::string function_at(std::uint64_t address) const;
+  std::string variable_at(std::uint64_t address) const;
+
+  struct AddressRange {
+    std::uint64_t begin = 0, end = 0;
+  };
+  /// .data, .bss and the like: what it may write, without what is read-only after relocation.
+  std::vector<AddressRange> writable_data() const;
 
  private:
   template <class T>
@@ -48,6 +62,10 @@ class ElfImage {
   std::uint64_t file_offset(std::uint64_t address) const;
   void find_dynamic();
   void find_symbols();
+  std::string symbol_at(std::uint64_t address, unsigned char type) const;
+  std::uint64_t dynamic_strings() const;
+  std::string dynamic_text(std::int64_t tag) const;
+  std::vector<std::uint64_t> library_names() const;
 
   struct SymbolTable {
     std::uint64_t offset = 0, count = 0, strings = 0;

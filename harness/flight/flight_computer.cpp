@@ -63,6 +63,21 @@ class FlightComputer::Impl {
   void on_input(std::uint32_t port, std::uint32_t payload);
   void on_tick();
   void on_output(std::uint32_t port, std::uint32_t payload, std::uint32_t life);
+  // What is modelled of one kind of call.
+  struct Timing {
+    ExecutionTime execution;
+    RandomStream* execution_draws = nullptr;  // null: it draws none
+    Duration jitter{0};
+    RandomStream* jitter_draws = nullptr;
+    SimTime latest;  // start so far: nobody of the same kind overtakes
+  };
+  void set_timings();
+  RandomStream& stream(const std::string& purpose);
+  Timing& timing_of(const std::string& what, const char* option, bool with_create);
+  void set_execution(Timing& timing, const std::string& what, const ExecutionTime& time);
+  SimTime with_jitter(Timing& timing, SimTime t);
+  void end_call(const Timing& timing, CallOutcome outcome);
+
   void on_boot(ResetCause cause);
   void on_reset(const EventKind& kind, ResetCause cause, Duration boot_delay);
   void on_boot_loop();
@@ -92,6 +107,10 @@ class FlightComputer::Impl {
   OwnerId owner_;
   Hooks hooks_;
   internal::PayloadPool payloads_;
+
+  std::unique_ptr<RandomStreams> own_random_;
+  std::vector<Timing> timings_;  // by port
+  Timing create_timing_, tick_timing_;
 
   // Of earlier lives.
   FlightProcess::Storage storage_;
@@ -127,12 +146,78 @@ FlightComputer::Impl::Impl(EventLoop& loop, OwnerId owner, FlightProcessOptions 
       owner_(owner),
       hooks_(std::move(hooks)),
       busy_until_(loop.now()) {
-  if (options.execution_time < Duration{0}) {
-    throw std::invalid_argument("FlightComputer: execution_time = " +
-                                to_string(options.execution_time) + "; it is 0 or more");
-  }
+  set_timings();
   dropped.resize(ports.size(), 0);
   waiting_.reserve(kMostWaiting);
+}
+
+// ---- time
+
+void FlightComputer::Impl::set_timings() {
+  if (options.random == nullptr) own_random_ = std::make_unique<RandomStreams>(0);
+  timings_.resize(ports.size());
+  for (std::size_t i = 0; i < ports.size(); ++i) {
+    set_execution(timings_[i], ports[i].name, options.execution_time);
+  }
+  set_execution(create_timing_, "create", options.execution_time);
+  set_execution(tick_timing_, "tick", options.execution_time);
+  for (const auto& [what, time] : options.execution_time_of) {
+    set_execution(timing_of(what, "execution_time_of", true), what, time);
+  }
+  for (const auto& [what, jitter] : options.scheduling_jitter) {
+    Timing& timing = timing_of(what, "scheduling_jitter", false);
+    if (jitter < Duration{0}) {
+      throw std::invalid_argument("FlightComputer: scheduling_jitter of " + what + " = " +
+                                  to_string(jitter) + "; it is 0 or more");
+    }
+    timing.jitter = jitter;
+    timing.jitter_draws = &stream("scheduling_jitter " + what);
+  }
+}
+
+RandomStream& FlightComputer::Impl::stream(const std::string& purpose) {
+  RandomStreams& streams = own_random_ != nullptr ? *own_random_ : *options.random;
+  return streams.stream(options.spacecraft, options.process, purpose);
+}
+
+FlightComputer::Impl::Timing& FlightComputer::Impl::timing_of(const std::string& what,
+                                                              const char* option,
+                                                              bool with_create) {
+  if (what == "tick") return tick_timing_;
+  if (what == "create" && with_create) return create_timing_;
+  return timings_[require_input(option, what)];
+}
+
+void FlightComputer::Impl::set_execution(Timing& timing, const std::string& what,
+                                         const ExecutionTime& time) {
+  if (time.counts_work() && !process->counts_work()) {
+    throw std::invalid_argument("FlightComputer: the execution time of " + what +
+                                " is that of counted work, and flight library \"" +
+                                options.library +
+                                "\" counts none; build it with orrery_add_flight_library(... "
+                                "COUNT_WORK)");
+  }
+  timing.execution = time;
+  timing.execution_draws = time.draws() ? &stream("execution_time " + what) : nullptr;
+}
+
+SimTime FlightComputer::Impl::with_jitter(Timing& timing, SimTime t) {
+  if (timing.jitter_draws == nullptr) return t;
+  timing.latest =
+      std::max(timing.latest, t + Duration(timing.jitter_draws->integer(0, to_ns(timing.jitter))));
+  return timing.latest;
+}
+
+// The call has run on the host; in simulated time it begins now.
+void FlightComputer::Impl::end_call(const Timing& timing, CallOutcome outcome) {
+  ++calls;
+  Duration time = timing.execution.of_call(timing.execution_draws, process->work());
+  if (hooks_.slow_down) {
+    const double factor = hooks_.slow_down(calls);
+    if (factor != 1) time = from_seconds(to_seconds(time) * factor);
+  }
+  busy_until_ = loop_.now() + time + process->virtual_time_spent();
+  take_over(outcome);
 }
 
 // ---- ports
@@ -182,10 +267,8 @@ void FlightComputer::Impl::on_boot(ResetCause cause) {
     return;
   }
   if (boots > 0) load_afresh();
-  ++calls;
-  busy_until_ = loop_.now() + options.execution_time;
   const auto boot_count = static_cast<std::uint32_t>(boots++);
-  take_over(process->create(loop_.now(), onboard_ns(), boot_count, cause));
+  end_call(create_timing_, process->create(loop_.now(), onboard_ns(), boot_count, cause));
 }
 
 void FlightComputer::Impl::on_boot_loop() {
@@ -257,7 +340,8 @@ void FlightComputer::Impl::deliver(std::string_view port, Bytes bytes, OwnerId o
   const FlightPort& p = ports[index];
   const auto schedule = [&](Bytes part) {
     const std::uint32_t payload = payloads_.put(part);
-    loop_.schedule(loop_.now(), {Phase::kDelivery, owner_, origin, &kInput},
+    loop_.schedule(with_jitter(timings_[index], loop_.now()),
+                   {Phase::kDelivery, owner_, origin, &kInput},
                    [this, index, payload] { on_input(index, payload); });
   };
   if (p.kind == PortKind::kStream) {
@@ -323,9 +407,7 @@ void FlightComputer::Impl::run_input(std::uint32_t port, std::uint32_t payload) 
          p.name + ", which takes " + std::to_string(p.max_bytes));
     return;
   }
-  ++calls;
-  busy_until_ = loop_.now() + options.execution_time;
-  take_over(process->input(loop_.now(), onboard_ns(), p, taken.bytes()));
+  end_call(timings_[port], process->input(loop_.now(), onboard_ns(), p, taken.bytes()));
 }
 
 void FlightComputer::Impl::on_tick() {
@@ -342,9 +424,7 @@ void FlightComputer::Impl::on_tick() {
 void FlightComputer::Impl::run_tick() {
   tick_waits_ = false;
   if (!makes_progress()) return;
-  ++calls;
-  busy_until_ = loop_.now() + options.execution_time;
-  take_over(process->tick(loop_.now(), onboard_ns()));
+  end_call(tick_timing_, process->tick(loop_.now(), onboard_ns()));
 }
 
 bool FlightComputer::Impl::makes_progress() {
@@ -407,7 +487,7 @@ void FlightComputer::Impl::set_tick(std::int64_t onboard_ns) {
     return;
   }
   const SimTime due = clock.truth(onboard_ns);
-  tick_event_ = loop_.schedule(due <= loop_.now() ? busy_until_ : due,
+  tick_event_ = loop_.schedule(with_jitter(tick_timing_, due <= loop_.now() ? busy_until_ : due),
                                {Phase::kTick, owner_, owner_, &kTick}, [this] { on_tick(); });
 }
 

@@ -17,7 +17,8 @@ namespace orrery {
 ///
 /// Calls    An input is an event of Phase::kDelivery, the tick one of Phase::kTick. A call starts
 ///          when the processor is free and runs at once on the host; its outputs leave at start +
-///          execution time, in order, as events of Phase::kOutput.
+///          execution time, in order, as events of Phase::kOutput. Clock reads and sleeps of flight
+///          code lengthen it (HostServices).
 /// Queue    While the processor is busy 64 inputs of 1 MiB together wait; of more the newest is
 ///          dropped and counted. The tick waits beside them, and goes first if it was due earlier.
 /// Tick     One pending. A new request replaces it, a negative one withdraws it; one in the past
@@ -37,11 +38,15 @@ class FlightComputer {
     std::function<void(LogLevel, std::string_view line)> on_log;
     std::function<void(const CrashReport&)> on_crash;
     std::function<void(const CallRecord&)> on_call;
-    std::function<void()> on_power_cycle;  // devices start cold
+    std::function<double(std::uint64_t call)> slow_down;  // factor on the execution time; calls
+                                                          // count from 1
+    std::function<void()> on_power_cycle;                 // devices start cold
   };
 
   /// Loads the library. The loop must outlive the computer.
-  /// @throws std::invalid_argument  as FlightProcess, and for a negative execution time.
+  /// @throws std::invalid_argument  as FlightProcess, and for execution times and jitters of
+  ///                                ports that do not exist, or of counted work in a library that
+  ///                                counts none.
   FlightComputer(EventLoop& loop, OwnerId owner, FlightProcessOptions options, Hooks hooks);
   ~FlightComputer();
   FlightComputer(const FlightComputer&) = delete;

@@ -1,10 +1,11 @@
 #include <orrery/harness/flight/flight_library.hpp>
 #include <orrery/harness/flight/floating_point.hpp>
+#include <orrery/harness/flight/library_closure.hpp>
 #include <orrery/harness/kernel/hash.hpp>
 #include <orrery/harness/kernel/text.hpp>
+#include <orrery/harness/kernel/time.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
@@ -12,7 +13,6 @@
 #include <cxxabi.h>
 #include <dlfcn.h>
 #include <filesystem>
-#include <fstream>
 #include <link.h>
 #include <map>
 #include <memory>
@@ -83,20 +83,10 @@ std::string file_stem(const std::string& name) {
                               "; name it after FLIGHT in orrery_add_test");
 }
 
-ByteBuffer read_file(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary | std::ios::ate);
-  if (!file) throw std::invalid_argument("cannot be read");
-  ByteBuffer bytes(static_cast<std::size_t>(file.tellg()));
-  file.seekg(0);
-  file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  if (!file) throw std::invalid_argument("cannot be read");
-  return bytes;
-}
-
 bool holds(const fs::path& path, const ByteBuffer& bytes) {
   std::error_code error;
   if (fs::file_size(path, error) != bytes.size() || error) return false;
-  return read_file(path) == bytes;
+  return internal::read_file(path.string()) == bytes;
 }
 
 // Files are compared in full before they are used again, so 64 bits are plenty.
@@ -167,6 +157,35 @@ void give_back_path(const std::string& path) {
   copies.paths.erase(path);
 }
 
+// "000" ... "zzz": what an instance's private libraries are called instead of "lib". The lowest
+// free one, so that files of earlier runs fit.
+struct CodesInUse {
+  std::mutex mutex;
+  std::set<std::string> codes;
+};
+CodesInUse& codes_in_use() {
+  static CodesInUse codes;
+  return codes;
+}
+
+std::string reserve_code() {
+  static constexpr char kDigits[] =
+      "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz";
+  CodesInUse& in_use = codes_in_use();
+  const std::lock_guard lock(in_use.mutex);
+  for (std::size_t n = 0; n < 62 * 62 * 62; ++n) {
+    const std::string code = {kDigits[n / 62 / 62], kDigits[n / 62 % 62], kDigits[n % 62]};
+    if (code != "lib" && in_use.codes.insert(code).second) return code;
+  }
+  throw std::invalid_argument("too many instances with private libraries are loaded");
+}
+
+void give_back_code(const std::string& code) {
+  CodesInUse& in_use = codes_in_use();
+  const std::lock_guard lock(in_use.mutex);
+  in_use.codes.erase(code);
+}
+
 std::string demangled(const std::string& symbol) {
   int status = 0;
   const std::unique_ptr<char, void (*)(void*)> text(
@@ -174,13 +193,16 @@ std::string demangled(const std::string& symbol) {
   return status == 0 ? text.get() : symbol;
 }
 
-// Libraries whose state the whole program shares anyway.
-bool belongs_to_the_system(const std::string& library) {
-  static constexpr std::array<std::string_view, 12> kSystem = {
-      "libc.so",  "libm.so",  "libstdc++.so", "libgcc_s.so", "ld-linux",   "libpthread.so",
-      "libdl.so", "librt.so", "libasan.so",   "libubsan.so", "libtsan.so", "libc++"};
-  return std::any_of(kSystem.begin(), kSystem.end(),
-                     [&](std::string_view s) { return library.compare(0, s.size(), s) == 0; });
+// Copies that nobody has used for so long go; those that are loaded keep their files' content.
+void prune_cache(const fs::path& folder) {
+  static std::once_flag once;
+  std::call_once(once, [&folder] {
+    std::error_code error;
+    const auto oldest = fs::file_time_type::clock::now() - days(30);
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+      if (entry.last_write_time(error) < oldest && !error) fs::remove_all(entry.path(), error);
+    }
+  });
 }
 
 }  // namespace
@@ -213,65 +235,112 @@ FlightLibrary::FlightLibrary(const FlightProcessOptions& options)
       loaded_path_(path_),
       is_copy_(options.isolation == Isolation::kCopy) {
   try {
-    if (is_copy_) make_copy(options);
-    load();
+    if (is_copy_) {
+      make_copy(options);
+    } else {
+      parts_.push_back({.path = path_});
+    }
+    for (Part& part : parts_) load(part);
   } catch (const std::exception& error) {
-    if (is_copy_) give_back_path(loaded_path_);
+    unload();
     refuse(name_, path_, error.what());
   }
 }
 
 FlightLibrary::~FlightLibrary() {
-  if (keep_loaded_) return;  // its path stays reserved
+  if (!keep_loaded_) unload();  // else its names stay reserved
+}
+
+void FlightLibrary::unload() {
   const internal::FloatingPointControl control = internal::FloatingPointControl::read();
-  dlclose(handle_);
+  for (auto part = parts_.rbegin(); part != parts_.rend(); ++part) {
+    if (part->handle != nullptr) dlclose(part->handle);
+  }
   control.restore();
   if (is_copy_) give_back_path(loaded_path_);
+  if (!code_.empty()) give_back_code(code_);
 }
 
 void FlightLibrary::make_copy(const FlightProcessOptions& options) {
-  internal::ElfImage image(read_file(path_));
-  for (const std::string& symbol : image.make_unique_symbols_weak()) {
-    edited_symbols_.push_back(demangled(symbol));
+  internal::LibraryClosure closure = internal::read_closure(path_);
+  shared_dependencies_ = closure.shared;
+  ByteBuffer all;
+  for (internal::LibraryPart& part : closure.parts) {
+    for (const std::string& symbol : part.image.make_unique_symbols_weak()) {
+      edited_symbols_.push_back(demangled(symbol));
+    }
+    part.life = part.image.detach_life_functions();
+    all.insert(all.end(), part.image.bytes().begin(), part.image.bytes().end());
   }
-  for (const std::string& library : image.needed()) {
-    if (!belongs_to_the_system(library)) shared_dependencies_.push_back(library);
+  const fs::path cache = cache_folder();
+  const fs::path folder = cache / content_key(all);
+  loaded_path_ = reserve_path(folder, options);
+  if (closure.parts.size() > 1) {
+    code_ = reserve_code();
+    internal::rename_parts(closure, code_);
   }
-  life_ = image.detach_life_functions();
-  loaded_path_ = reserve_path(cache_folder() / content_key(image.bytes()), options);
-  if (!holds(loaded_path_, image.bytes())) write_atomically(loaded_path_, image.bytes());
+  prune_cache(cache);
+  for (const internal::LibraryPart& part : closure.parts) {
+    const bool is_last = &part == &closure.parts.back();
+    // dsc.gnc.so and, beside it, dsc.gnc.libecos.so
+    std::string path = loaded_path_;
+    if (!is_last) path.replace(path.size() - 2, 2, part.name);
+    if (!holds(path, part.image.bytes())) write_atomically(path, part.image.bytes());
+    parts_.push_back({.path = path, .life = part.life});
+  }
+  std::error_code error;  // for prune_cache: it is in use
+  fs::last_write_time(folder, fs::file_time_type::clock::now(), error);
 }
 
-void FlightLibrary::load() {
+void FlightLibrary::load(Part& part) {
   // Start-up code that -ffast-math links in sets the control registers of this thread.
   const internal::FloatingPointControl control = internal::FloatingPointControl::read();
-  handle_ = dlopen(loaded_path_.c_str(), RTLD_NOW | RTLD_LOCAL);
+  part.handle = dlopen(part.path.c_str(), RTLD_NOW | RTLD_LOCAL);
   control.restore();
-  if (handle_ == nullptr) throw std::invalid_argument(dlerror());
+  if (part.handle == nullptr) throw std::invalid_argument(dlerror());
   link_map* map = nullptr;
-  dlinfo(handle_, RTLD_DI_LINKMAP, &map);
-  base_ = map->l_addr;
+  dlinfo(part.handle, RTLD_DI_LINKMAP, &map);
+  part.base = map->l_addr;
 }
 
 void* FlightLibrary::symbol(const char* name) const {
-  return dlsym(handle_, name);
+  return dlsym(parts_.back().handle, name);
 }
 
+std::uintptr_t FlightLibrary::base() const {
+  return parts_.back().base;
+}
+
+std::vector<std::string> FlightLibrary::loaded_paths() const {
+  std::vector<std::string> paths;
+  for (const Part& part : parts_) paths.push_back(part.path);
+  return paths;
+}
+
+// Of what it links first, as the loader would.
 void FlightLibrary::run_constructors() const {
   using Constructor = void (*)(int, char**, char**);
   static char* no_arguments[] = {nullptr};
-  if (life_.init != 0) reinterpret_cast<Constructor>(base_ + life_.init)(0, no_arguments, environ);
-  const auto* functions = reinterpret_cast<const Constructor*>(base_ + life_.init_array);
-  for (std::size_t i = 0; i < life_.init_array_bytes / sizeof(Constructor); ++i) {
-    functions[i](0, no_arguments, environ);
+  for (const Part& part : parts_) {
+    const internal::LifeFunctions& life = part.life;
+    if (life.init != 0) {
+      reinterpret_cast<Constructor>(part.base + life.init)(0, no_arguments, environ);
+    }
+    const auto* functions = reinterpret_cast<const Constructor*>(part.base + life.init_array);
+    for (std::size_t i = 0; i < life.init_array_bytes / sizeof(Constructor); ++i) {
+      functions[i](0, no_arguments, environ);
+    }
   }
 }
 
 void FlightLibrary::run_destructors() const {
   using Destructor = void (*)();
-  const auto* functions = reinterpret_cast<const Destructor*>(base_ + life_.fini_array);
-  for (std::size_t i = life_.fini_array_bytes / sizeof(Destructor); i-- > 0;) functions[i]();
-  if (life_.fini != 0) reinterpret_cast<Destructor>(base_ + life_.fini)();
+  for (auto part = parts_.rbegin(); part != parts_.rend(); ++part) {
+    const internal::LifeFunctions& life = part->life;
+    const auto* functions = reinterpret_cast<const Destructor*>(part->base + life.fini_array);
+    for (std::size_t i = life.fini_array_bytes / sizeof(Destructor); i-- > 0;) functions[i]();
+    if (life.fini != 0) reinterpret_cast<Destructor>(part->base + life.fini)();
+  }
 }
 
 }  // namespace orrery

@@ -24,8 +24,9 @@ std::string find_flight_library(const std::string& name);
 ///          per program are made weak in it, and its static constructors and destructors are left
 ///          to run_constructors() and run_destructors(). Files lie in a cache by content
 ///          (XDG_CACHE_HOME, else the folder for temporary files), named after the process, and
-///          stay there: core dumps and debuggers need them. What the library links is shared by
-///          all copies.
+///          stay there for 30 days after their last use: core dumps and debuggers need them. What
+///          the library links of the team's own is copied with it, under other names ("lib" in
+///          them becomes a code of the instance), so that each copy finds its own.
 /// kShared  The file itself; the loader runs constructors and destructors.
 class FlightLibrary {
  public:
@@ -40,9 +41,12 @@ class FlightLibrary {
   void* symbol(const char* name) const;
   const std::string& path() const { return path_; }  // that was found
   const std::string& loaded_path() const { return loaded_path_; }
+  std::vector<std::string> loaded_paths() const;  // of what was copied with it, too
+  std::uintptr_t base() const;                    // where it is loaded
   /// Symbols that the copy had to change, demangled.
   const std::vector<std::string>& edited_symbols() const { return edited_symbols_; }
-  /// Libraries of the team's own that it links: one load of them serves all copies.
+  /// Libraries that it links beyond the C and C++ run time and were not copied with it: the
+  /// system's, and those without a SONAME that begins with "lib". One load of them serves all.
   const std::vector<std::string>& shared_dependencies() const { return shared_dependencies_; }
 
   /// Flight code: call these within the boundary. Nothing with kShared.
@@ -54,13 +58,19 @@ class FlightLibrary {
 
  private:
   void make_copy(const FlightProcessOptions& options);
-  void load();
+  struct Part {
+    std::string path = {};
+    internal::LifeFunctions life = {};
+    void* handle = nullptr;
+    std::uintptr_t base = 0;
+  };
+  static void load(Part& part);
+  void unload();
 
   std::string name_, path_, loaded_path_;
   std::vector<std::string> edited_symbols_, shared_dependencies_;
-  internal::LifeFunctions life_;
-  void* handle_ = nullptr;
-  std::uintptr_t base_ = 0;
+  std::vector<Part> parts_;  // what it links first; itself last
+  std::string code_;         // of its private libraries, if it has any
   bool is_copy_ = false;
   bool keep_loaded_ = false;
 };

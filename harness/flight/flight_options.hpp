@@ -1,10 +1,12 @@
 /// How one flight process is loaded and what it is given.
 #pragma once
 
+#include <orrery/harness/flight/execution_time.hpp>
 #include <orrery/harness/heap/heap_options.hpp>
 #include <orrery/harness/kernel/time.hpp>
 
 #include <cstdint>
+#include <map>
 #include <string>
 
 namespace orrery {
@@ -20,6 +22,13 @@ enum class Isolation : std::uint8_t {
 enum class HeapExhaustion : std::uint8_t {
   kNull,   // malloc returns null, so `new` throws std::bad_alloc
   kCrash,  // the process ends there
+};
+
+/// What the C library answers flight code that asks for the time, for random numbers, for sleep.
+enum class HostServices : std::uint8_t {
+  kVirtual,  // from the onboard clock and the run's random streams; threads are refused
+  kStrict,   // each such call ends the process, by name
+  kHost,     // as outside of a simulation: no two runs are the same
 };
 
 struct FlightProcessOptions {
@@ -38,9 +47,15 @@ struct FlightProcessOptions {
   /// COUNT_WORK; 0: any number. Past it the process ends, at the same instruction in every run.
   std::uint64_t work_budget = 0;
   Duration host_time_limit{10'000'000'000};  // of CPU time in one call, the last resort; 0: none
-  Duration execution_time{0};                // of every call; outputs leave when it has passed
-  RandomStreams* random = nullptr;           // of the run; null: a set of the process's own
-  bool clock_keeps_power = false;  // false: after a power cycle the clock starts at its zero
+  ExecutionTime execution_time = {};         // of every call; outputs leave when it has passed
+  /// By input port, "create" or "tick": in place of execution_time.
+  std::map<std::string, ExecutionTime> execution_time_of = {};
+  /// By input port, or "tick": a call starts later by a time drawn evenly from 0 to this, without
+  /// overtaking one of the same port.
+  std::map<std::string, Duration> scheduling_jitter = {};
+  HostServices services = HostServices::kVirtual;
+  RandomStreams* random = nullptr;  // of the run; null: a set of the process's own
+  bool clock_keeps_power = false;   // false: after a power cycle the clock starts at its zero
 };
 
 /// "dsc/gnc": how messages and records name a process.

@@ -57,6 +57,7 @@ FlightProcess::Impl::Impl(FlightProcessOptions o) : options(std::move(o)) {
   check_limits(options);
   name = process_name(options);
   contained_.name = name.c_str();
+  contained_.services = &services;
   if (internal::call_in_progress()) {
     throw std::logic_error("FlightProcess: loaded from within a call of flight code");
   }
@@ -102,6 +103,9 @@ void FlightProcess::Impl::load() {
   } catch (const std::invalid_argument& error) {
     shut_down_library();
     refuse(error.what());
+  }
+  if (options.isolation == Isolation::kShared) {
+    globals.emplace(library->loaded_path(), library->base(), work, sizeof *work);
   }
   input_.reserve(64);  // never a null pointer, of an empty message either
 }
@@ -190,6 +194,7 @@ CallOutcome FlightProcess::Impl::call(CallArguments arguments, SimTime truth, By
   input_.assign(data.begin(), data.end());
   arguments.bytes = static_cast<std::uint32_t>(data.size());
   arguments_ = arguments;
+  services.begin_call(truth, arguments.onboard_ns, arguments.call == Call::kCreate);
   begin_call();
   stopwatch.start();
   const bool returned = internal::run_contained(
@@ -239,6 +244,7 @@ void FlightProcess::Impl::end_call(SimTime truth) {
     }
   }
   report_floating_point();
+  report_written_global();
 }
 
 CallOutcome FlightProcess::Impl::judge(const CallArguments& arguments, SimTime truth) {
@@ -266,8 +272,8 @@ void FlightProcess::Impl::die(CrashKind kind, std::string message, SimTime truth
   crash.t = truth;
   crash.onboard_ns = arguments.onboard_ns;
   crash.kind = kind;
-  const bool raised = kind == CrashKind::kSignal || kind == CrashKind::kAbort ||
-                      kind == CrashKind::kStackOverflow;
+  const bool raised =
+      kind == CrashKind::kSignal || kind == CrashKind::kAbort || kind == CrashKind::kStackOverflow;
   crash.signal = raised ? capture_.signal : 0;
   crash.status = arguments.status;
   crash.message = std::move(message);
@@ -278,7 +284,7 @@ void FlightProcess::Impl::die(CrashKind kind, std::string message, SimTime truth
     crash.input = input_;
   }
   if (work != nullptr) crash.work = work->count;
-  crash.backtrace = internal::stack_frames(capture_, library->loaded_path());
+  crash.backtrace = internal::stack_frames(capture_, library->loaded_paths());
   capture_.frame_count = 0;
   if (kind == CrashKind::kHeapFault) tell_of_block(fault_address_);
 
@@ -363,6 +369,18 @@ void FlightProcess::Impl::report_floating_point() {
   host_log(LogLevel::kWarning,
            "flight code changed the floating-point control registers (flush to zero, rounding or "
            "exceptions); they are put back after every call");
+}
+
+void FlightProcess::Impl::report_written_global() {
+  ++calls;
+  const bool looks = (calls & (calls - 1)) == 0;  // 1, 2, 4, 8 ...
+  if (!globals || !looks || !written_global.empty()) return;
+  written_global = globals->changed();
+  if (written_global.empty()) return;
+  host_log(LogLevel::kWarning, "flight library \"" + options.library +
+                                   "\" writes its own globals (" + written_global +
+                                   "), which all its processes share under Isolation::kShared; "
+                                   "Isolation::kCopy gives each its own");
 }
 
 void FlightProcess::Impl::host_log(LogLevel level, std::string_view text) {
@@ -487,6 +505,9 @@ std::uint64_t FlightProcess::stack_high_water_bytes() const {
 std::uint64_t FlightProcess::work() const {
   return impl_->work == nullptr ? 0 : impl_->work->count;
 }
+Duration FlightProcess::virtual_time_spent() const {
+  return impl_->services.spent();
+}
 bool FlightProcess::counts_work() const {
   return impl_->work != nullptr;
 }
@@ -520,6 +541,9 @@ void FlightProcess::set_storage(Storage storage) {
 }
 const std::vector<std::string>& FlightProcess::edited_symbols() const {
   return impl_->library->edited_symbols();
+}
+const std::string& FlightProcess::written_global() const {
+  return impl_->written_global;
 }
 const std::vector<std::string>& FlightProcess::shared_dependencies() const {
   return impl_->library->shared_dependencies();

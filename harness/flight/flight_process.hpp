@@ -121,7 +121,9 @@ class FlightProcess {
   /// Most of its stack that it has used; 0 where it has none of its own.
   std::uint64_t stack_high_water_bytes() const;
   std::uint64_t work() const;  // edges that the last call took, where the library counts them
-  bool counts_work() const;    // the library was built with COUNT_WORK
+  /// What clock reads and sleeps of the last call took: it lengthens the execution time.
+  Duration virtual_time_spent() const;
+  bool counts_work() const;  // the library was built with COUNT_WORK
   /// Below what the heap already has is allowed: it stops growing.
   /// @throws std::invalid_argument  above 4 GiB less 1 MiB.
   void set_heap_limit(std::uint64_t bytes);
@@ -141,7 +143,11 @@ class FlightProcess {
   /// Symbols of the library that would have been one for all its copies, and were made one per
   /// copy.
   const std::vector<std::string>& edited_symbols() const;
-  /// Libraries of the team's own that all copies of this one share.
+  /// Isolation::kShared: the first variable of the library that is seen to have changed since it
+  /// was loaded; empty: none, so far. All processes of the library share it. Looked for after the
+  /// 1st, 2nd, 4th, 8th ... call, and logged once.
+  const std::string& written_global() const;
+  /// Libraries beyond the C and C++ run time that all copies of this one share.
   const std::vector<std::string>& shared_dependencies() const;
 
   /// Host time spent within calls, for reports only: it repeats in no run.

@@ -5,7 +5,9 @@
 #include <orrery/harness/flight/containment.hpp>
 #include <orrery/harness/flight/flight_library.hpp>
 #include <orrery/harness/flight/flight_process.hpp>
+#include <orrery/harness/flight/globals_watch.hpp>
 #include <orrery/harness/flight/host_stopwatch.hpp>
+#include <orrery/harness/flight/virtual_services.hpp>
 
 #include <cstdint>
 #include <memory>
@@ -64,7 +66,12 @@ class FlightProcess::Impl {
   std::unique_ptr<SimulatedHeap> heap;           // null where heaps are not simulated
   std::unique_ptr<internal::FlightStack> stack;  // null: calls run on the caller's
   std::unique_ptr<FlightLibrary> library;        // unloaded while heap and stack are still there
-  orrery_work* work = nullptr;                   // of the library; null: it counts none
+  internal::VirtualServices services{options};
+  orrery_work* work = nullptr;  // of the library; null: it counts none
+
+  std::optional<internal::GlobalsWatch> globals;  // Isolation::kShared
+  std::string written_global;
+  std::uint64_t calls = 0;
 
   bool created = false, alive = false;
   bool crashed = false;  // or cut off: its destructors never run
@@ -100,6 +107,7 @@ class FlightProcess::Impl {
   void report_floating_point();
   void tell_of_block(const void* address);
   std::vector<StackFrame> frames(const CallStack& stack) const;
+  void report_written_global();
   bool calling() const { return internal::running_process() == &contained_; }
   std::uint32_t find_output(std::uint32_t id) const;
   static void on_heap_fault(void* self, const HeapFault& fault);

@@ -8,8 +8,9 @@
 
 namespace orrery::internal {
 
-/// Without the harness's own frames at either end. `library` is read for its symbols, hidden ones
-/// included; of other files only what the loader tells.
-std::vector<StackFrame> stack_frames(const CrashCapture& capture, const std::string& library);
+/// Without the harness's own frames at either end. These libraries are read for their symbols,
+/// hidden ones included; of other files only what the loader tells.
+std::vector<StackFrame> stack_frames(const CrashCapture& capture,
+                                     const std::vector<std::string>& libraries);
 
 }  // namespace orrery::internal

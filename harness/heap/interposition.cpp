@@ -17,6 +17,8 @@
 // Defined by orrery::allocator; a program without it has none.
 extern "C" [[gnu::weak]] bool orrery_allocator_simulates();
 extern "C" [[gnu::weak]] const char* orrery_allocator_hook_not_taken(std::size_t index);
+extern "C" [[gnu::weak]] bool orrery_services_are_virtual();
+extern "C" [[gnu::weak]] const char* orrery_service_hook_not_taken(std::size_t index);
 
 namespace orrery {
 namespace internal {
@@ -24,6 +26,7 @@ namespace internal {
 constinit std::uintptr_t loader_begin = 0;
 constinit std::uintptr_t loader_bytes = 0;
 constinit const ProcessHooks* process_hooks = nullptr;
+constinit const ServiceHooks* service_hooks = nullptr;
 
 }  // namespace internal
 
@@ -69,6 +72,10 @@ bool heap_simulation_available() {
   return orrery_allocator_simulates != nullptr && orrery_allocator_simulates();
 }
 
+bool services_are_virtual() {
+  return orrery_services_are_virtual != nullptr && orrery_services_are_virtual();
+}
+
 void warm_up_libraries() {
   static std::once_flag once;
   std::call_once(once, [] {
@@ -81,13 +88,14 @@ void warm_up_libraries() {
 }
 
 std::string verify_interposition() {
-  if (!heap_simulation_available()) return "";
   std::string names;
-  for (std::size_t i = 0;; ++i) {
-    const char* name = orrery_allocator_hook_not_taken(i);
-    if (name == nullptr) break;
-    names += (names.empty() ? "" : ", ") + std::string(name);
-  }
+  const auto ask = [&names](const char* (*not_taken)(std::size_t)) {
+    for (std::size_t i = 0; const char* name = not_taken(i); ++i) {
+      names += (names.empty() ? "" : ", ") + std::string(name);
+    }
+  };
+  if (heap_simulation_available()) ask(orrery_allocator_hook_not_taken);
+  if (services_are_virtual()) ask(orrery_service_hook_not_taken);
   if (names.empty()) return "";
   return "these functions of the simulated heap are not reached by shared libraries: " + names +
          "; link the test program with orrery::allocator, whose --dynamic-list exports them";

@@ -3,7 +3,9 @@
 
 #include <orrery/harness/kernel/simulator_only.hpp>
 
+#include <cstddef>
 #include <cstdint>
+#include <ctime>
 #include <string>
 
 namespace orrery {
@@ -16,6 +18,10 @@ void warm_up_libraries();
 /// Self-test of the allocator's hooks: empty, or a message naming those that shared libraries of
 /// this program do not reach. Also empty where heaps are not simulated.
 std::string verify_interposition();
+
+/// True where time, chance and threads of flight code are answered by us: not under a sanitizer
+/// that owns these functions.
+bool services_are_virtual();
 
 namespace internal {
 
@@ -33,6 +39,19 @@ struct ProcessHooks {
   int (*call_stack)(void** frames, int most);
 };
 extern const ProcessHooks* process_hooks;
+
+/// What the C library answers flight code; set once by harness/flight. Each gets the name of the
+/// function that was called. False: the C library answers.
+struct ServiceHooks {
+  bool (*read_clock)(const char* function, clockid_t clock, std::int64_t& ns);
+  bool (*sleep)(const char* function, std::int64_t ns);
+  bool (*sleep_until)(const char* function, clockid_t clock, std::int64_t ns);
+  bool (*random_bytes)(const char* function, void* to, std::size_t bytes);
+  bool (*random_number)(const char* function, std::int32_t& number);  // 0 ... 2^31 - 1
+  bool (*seed)(const char* function, unsigned value);
+  bool (*start_thread)(const char* function);
+};
+extern const ServiceHooks* service_hooks;
 
 }  // namespace internal
 }  // namespace orrery

@@ -1,6 +1,7 @@
 #include <orrery/harness/flight/elf_image.hpp>
 #include <orrery/harness/flight/flight_library.hpp>
 #include <orrery/harness/flight/flight_process.hpp>
+#include <orrery/harness/flight/library_closure.hpp>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,10 +11,14 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <sys/stat.h>
+#include <vector>
+
+#include "orders.hpp"
 
 namespace orrery {
 namespace {
@@ -141,6 +146,103 @@ INSTANTIATE_TEST_SUITE_P(
       name.erase(std::remove(name.begin(), name.end(), '_'), name.end());
       return name;
     });
+
+std::string count(FlightProcess& process) {
+  process.input(SimTime{}, 0, process.ports()[0], {});
+  return text_of(process.output(0).data);
+}
+
+// Each count of the outer library adds one of the inner: "101", "202", "303" ... in every instance.
+TEST(LibraryClosureTest, HiddenStateOfDependenciesIsPerInstance) {
+  std::vector<std::unique_ptr<FlightProcess>> processes;
+  for (int i = 0; i < 5; ++i) {
+    FlightProcessOptions o = options("flight_test_linked");
+    o.spacecraft = "sc" + std::to_string(i);
+    processes.push_back(std::make_unique<FlightProcess>(o));
+    processes.back()->create(SimTime{}, 0);
+    EXPECT_THAT(processes.back()->shared_dependencies(), testing::IsEmpty());
+  }
+  for (int round = 1; round <= 3; ++round) {
+    for (const auto& process : processes) EXPECT_EQ(count(*process), std::to_string(101 * round));
+  }
+  processes[2].reset();  // and the next of that name begins anew
+  FlightProcessOptions o = options("flight_test_linked");
+  o.spacecraft = "sc2";
+  processes[2] = std::make_unique<FlightProcess>(o);
+  processes[2]->create(SimTime{}, 0);
+  EXPECT_EQ(count(*processes[2]), "101");
+  EXPECT_EQ(count(*processes[3]), "404");
+}
+
+TEST(LibraryClosureTest, SharedLoadSharesThem) {
+  FlightProcessOptions o = options("flight_test_linked");
+  o.isolation = Isolation::kShared;
+  FlightProcess a(o), b(o);
+  a.create(SimTime{}, 0);
+  b.create(SimTime{}, 0);
+  const int first = std::stoi(count(a));
+  EXPECT_EQ(std::stoi(count(b)), first + 101);
+}
+
+TEST(LibraryClosureTest, NamesChangeInPlaceAndInEveryPart) {
+  internal::LibraryClosure closure =
+      internal::read_closure(find_flight_library("flight_test_linked"));
+  ASSERT_EQ(closure.parts.size(), 3u);
+  EXPECT_EQ(closure.parts[0].name, "libflight_test_inner.so");  // what is needed comes first
+  EXPECT_EQ(closure.parts[1].name, "libflight_test_outer.so");
+  const std::size_t size = closure.parts[2].image.bytes().size();
+  internal::rename_parts(closure, "i07");
+  EXPECT_EQ(closure.parts[0].image.soname(), "i07flight_test_inner.so");
+  EXPECT_THAT(closure.parts[1].image.needed(), testing::Contains("i07flight_test_inner.so"));
+  EXPECT_THAT(closure.parts[2].image.needed(),
+              testing::IsSupersetOf({"i07flight_test_inner.so", "i07flight_test_outer.so"}));
+  EXPECT_THAT(closure.parts[2].image.needed(), testing::Contains("libc.so.6"));
+  EXPECT_EQ(closure.parts[2].image.bytes().size(), size);
+}
+
+// Instances of 64 spacecraft at once, each with its own count.
+TEST(FlightLibraryTest, SixtyFourInstancesHaveGlobalsOfTheirOwn) {
+  std::vector<std::unique_ptr<FlightProcess>> processes;
+  for (int i = 0; i < 64; ++i) {
+    FlightProcessOptions o = options("flight_test_linked");
+    o.spacecraft = "sc" + std::to_string(i);
+    processes.push_back(std::make_unique<FlightProcess>(o));
+    ASSERT_EQ(processes.back()->create(SimTime{}, 0), CallOutcome::kDone);
+  }
+  for (int i = 0; i < 64; ++i) {
+    for (int n = 0; n < i % 3; ++n) count(*processes[static_cast<std::size_t>(i)]);
+  }
+  for (int i = 0; i < 64; ++i) {
+    EXPECT_EQ(count(*processes[static_cast<std::size_t>(i)]), std::to_string(101 * (i % 3 + 1)));
+  }
+}
+
+TEST(GlobalsWatchTest, SharedLibraryThatWritesItsGlobalsIsNamed) {
+  FlightProcessOptions o = options("flight_test_subject");
+  o.isolation = Isolation::kShared;
+  FlightProcess process(o);
+  process.create(SimTime{}, 0);  // it keeps its host table in a global
+  EXPECT_EQ(process.written_global(), "subject");
+  ASSERT_EQ(process.log_count(), 1u);
+  EXPECT_THAT(std::string(process.log_line(0).text),
+              AllOf(HasSubstr("\"flight_test_subject\" writes its own globals (subject)"),
+                    HasSubstr("kCopy")));
+  for (int i = 0; i < 10; ++i) {
+    process.input(SimTime{}, 0, process.ports()[0], order("ea"));
+    EXPECT_EQ(process.log_count(), 0u);  // once
+  }
+}
+
+TEST(GlobalsWatchTest, LibraryWithoutGlobalsAndCopiesAreSilent) {
+  FlightProcessOptions o = options("flight_test_services");
+  o.isolation = Isolation::kShared;
+  FlightProcess without(o), copy(options("flight_test_subject"));
+  for (FlightProcess* process : {&without, &copy}) {
+    process->create(SimTime{}, 0);
+    for (int i = 0; i < 10; ++i) process->input(SimTime{}, 0, process->ports()[0], order("1"));
+    EXPECT_EQ(process->written_global(), "");
+  }
+}
 
 TEST(FlightLibraryTest, TwoInstancesAliveAtOnceShareNoFile) {
   const FlightLibrary a(options("beacon"));
