@@ -617,6 +617,9 @@ HeapFigures FlightComputer::heap() const {
 std::uint64_t FlightComputer::stack_high_water_bytes() const {
   return impl_->process == nullptr ? 0 : impl_->process->stack_high_water_bytes();
 }
+std::string FlightComputer::written_global() const {
+  return impl_->process == nullptr ? "" : impl_->process->written_global();
+}
 void FlightComputer::set_heap_limit(std::uint64_t bytes) {
   if (impl_->process != nullptr) impl_->process->set_heap_limit(bytes);
   impl_->options.heap_bytes = bytes;

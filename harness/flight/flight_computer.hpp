@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -91,6 +92,7 @@ class FlightComputer {
 
   HeapFigures heap() const;
   std::uint64_t stack_high_water_bytes() const;  // of this life
+  std::string written_global() const;            // FlightProcess::written_global()
   /// @throws std::invalid_argument  above 4 GiB less 1 MiB.
   void set_heap_limit(std::uint64_t bytes);
   /// A sample per call; empty where heaps are not simulated.

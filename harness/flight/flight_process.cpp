@@ -313,7 +313,7 @@ void FlightProcess::Impl::tell_of_block(const void* address) {
 std::vector<StackFrame> FlightProcess::Impl::frames(const CallStack& stack) const {
   internal::CrashCapture capture;
   for (const void* frame : stack) capture.frames[capture.frame_count++] = const_cast<void*>(frame);
-  return internal::stack_frames(capture, library->loaded_path());
+  return internal::stack_frames(capture, library->loaded_paths());
 }
 
 std::string FlightProcess::Impl::check_heap() {
@@ -373,7 +373,7 @@ void FlightProcess::Impl::report_floating_point() {
 
 void FlightProcess::Impl::report_written_global() {
   ++calls;
-  const bool looks = (calls & (calls - 1)) == 0;  // 1, 2, 4, 8 ...
+  const bool looks = calls <= 16 || (calls & (calls - 1)) == 0;  // then 32, 64 ...
   if (!globals || !looks || !written_global.empty()) return;
   written_global = globals->changed();
   if (written_global.empty()) return;

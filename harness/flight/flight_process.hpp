@@ -144,8 +144,8 @@ class FlightProcess {
   /// copy.
   const std::vector<std::string>& edited_symbols() const;
   /// Isolation::kShared: the first variable of the library that is seen to have changed since it
-  /// was loaded; empty: none, so far. All processes of the library share it. Looked for after the
-  /// 1st, 2nd, 4th, 8th ... call, and logged once.
+  /// was loaded; empty: none, so far. All processes of the library share it. Looked for after
+  /// each of the first 16 calls, then after the 32nd, 64th ..., and logged once as a warning.
   const std::string& written_global() const;
   /// Libraries beyond the C and C++ run time that all copies of this one share.
   const std::vector<std::string>& shared_dependencies() const;

@@ -1,10 +1,19 @@
 #include <orrery/harness/gtest/flags.hpp>
 #include <orrery/harness/gtest/run_context.hpp>
+#include <orrery/harness/heap/simulated_heap.hpp>
 #include <orrery/harness/record/number_format.hpp>
 
 #include <algorithm>
+#include <cstdio>
 #include <utility>
 #include <vector>
+
+/// For debuggers (orrery.gdb), which may have stopped within flight code.
+extern "C" __attribute__((noinline, used)) void orrery_debug_state() {
+  const orrery::HeapGuard none(nullptr);
+  std::fputs(orrery::describe_live_runs().c_str(), stdout);
+  std::fflush(stdout);
+}
 
 namespace orrery {
 namespace {

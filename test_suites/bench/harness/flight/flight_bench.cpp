@@ -6,7 +6,12 @@
 #include <benchmark/benchmark.h>
 
 #include <cstddef>
+#include <cstdint>
+#include <fstream>
 #include <memory>
+#include <string>
+#include <unistd.h>
+#include <vector>
 
 namespace orrery {
 namespace {
@@ -83,6 +88,33 @@ void BM_FlightProcess_Crash(benchmark::State& state) {
   }
 }
 BENCHMARK(BM_FlightProcess_Crash)->Unit(benchmark::kMicrosecond);
+
+std::int64_t resident_bytes() {
+  std::int64_t total = 0, resident = 0;
+  std::ifstream("/proc/self/statm") >> total >> resident;
+  return resident * sysconf(_SC_PAGESIZE);
+}
+
+// 64 isolated instances at once, created; their files are in the cache after the first round.
+void BM_FlightProcess_Load64Copies(benchmark::State& state) {
+  double bytes = 0;
+  for (auto _ : state) {
+    std::vector<std::unique_ptr<FlightProcess>> processes;
+    const std::int64_t before = resident_bytes();
+    for (int i = 0; i < 64; ++i) {
+      FlightProcessOptions options = subject();
+      options.spacecraft = "sc" + std::to_string(i);
+      processes.push_back(std::make_unique<FlightProcess>(options));
+      processes.back()->create(kStart, 0);
+    }
+    bytes = static_cast<double>(resident_bytes() - before) / 64;
+    state.PauseTiming();
+    processes.clear();
+    state.ResumeTiming();
+  }
+  state.counters["bytes_each"] = bytes;
+}
+BENCHMARK(BM_FlightProcess_Load64Copies)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace orrery
