@@ -255,37 +255,39 @@ LogCommandReader::Outcome LogCommandReader::log_line(const Words& words) {
   if (words.size() <= at) return Outcome::missing_field("no log is named");
   const KnownLog* const known = find(words[at]);
   if (known == nullptr) return Outcome::invalid_field(words[at], unknown_log(words[at]));
-  const auto word = [&](std::size_t after) {
-    return at + after < words.size() ? words[at + after] : std::string_view();
-  };
-  if (words.size() > at + 5) return Outcome::invalid_field(word(5), "a word too many");
+  return log_arguments(known->id, std::span(words).subspan(at + 1));
+}
 
-  LogRequest request{.message_id = known->id};
-  double period_s = 0, offset_s = 0;
-  if (!word(1).empty()) {
-    const std::optional<std::uint32_t> trigger = trigger_number(word(1));
-    if (!trigger)
+// What follows the message: trigger, period, offset, hold; each may be left out with those behind
+// it.
+LogCommandReader::Outcome LogCommandReader::log_arguments(std::uint16_t message_id,
+                                                          std::span<const std::string_view> words) {
+  LogRequest request{.message_id = message_id};
+  double times_s[2] = {0, 0};  // period, offset
+  if (words.size() > 4) return Outcome::invalid_field(words[4], "a word too many");
+  if (!words.empty()) {
+    const std::optional<std::uint32_t> trigger = trigger_number(words[0]);
+    if (!trigger) {
       return Outcome::invalid_field(
-          word(1), "trigger " + std::string(word(1)) + "; accepted: ONTIME, ONCHANGED, ONCE");
+          words[0], "trigger " + std::string(words[0]) + "; accepted: ONTIME, ONCHANGED, ONCE");
+    }
     request.trigger = LogTrigger{*trigger};
   }
-  if (!word(2).empty()) {
-    const std::optional<double> value = number(word(2));
-    if (!value) return Outcome::invalid_field(word(2), "period " + std::string(word(2)));
-    period_s = *value;
-  }
-  if (!word(3).empty()) {
-    const std::optional<double> value = number(word(3));
-    if (!value) return Outcome::invalid_field(word(3), "offset " + std::string(word(3)));
-    offset_s = *value;
-  }
-  if (!word(4).empty()) {
-    if (word(4) != "HOLD" && word(4) != "NOHOLD") {
-      return Outcome::invalid_field(word(4), std::string(word(4)) + "; accepted: HOLD, NOHOLD");
+  for (std::size_t k = 1; k < std::min<std::size_t>(words.size(), 3); ++k) {
+    const std::optional<double> value = number(words[k]);
+    if (!value) {
+      return Outcome::invalid_field(words[k],
+                                    (k == 1 ? "period " : "offset ") + std::string(words[k]));
     }
-    request.hold = word(4) == "HOLD";
+    times_s[k - 1] = *value;
   }
-  const Outcome times = check_times(request, period_s, offset_s);
+  if (words.size() == 4) {
+    if (words[3] != "HOLD" && words[3] != "NOHOLD") {
+      return Outcome::invalid_field(words[3], std::string(words[3]) + "; accepted: HOLD, NOHOLD");
+    }
+    request.hold = words[3] == "HOLD";
+  }
+  const Outcome times = check_times(request, times_s[0], times_s[1]);
   return times.ok() ? log(request) : times;
 }
 

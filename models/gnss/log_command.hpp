@@ -61,6 +61,7 @@ class LogCommandReader {
   Outcome unlog(std::uint16_t message_id);
   Outcome check_times(LogRequest& request, double period_s, double offset_s) const;
   Outcome log_line(const Words& words);
+  Outcome log_arguments(std::uint16_t message_id, std::span<const std::string_view> words);
   Outcome unlog_line(const Words& words);
   Outcome unlog_all_line(const Words& words);
   Outcome log_frame(Bytes body);
