@@ -159,8 +159,8 @@ struct OrbitDynamics::Point {
 };
 
 OrbitDynamics::OrbitDynamics(std::shared_ptr<const SpaceEnvironment> environment, Forces forces,
-                             std::shared_ptr<const AttitudeLaw> attitude)
-    : environment_(std::move(environment)), attitude_(std::move(attitude)) {
+                             std::shared_ptr<const AttitudeLaw> attitude, OrbitVariables variables)
+    : environment_(std::move(environment)), attitude_(std::move(attitude)), variables_(variables) {
   if (environment_ == nullptr) throw std::invalid_argument("OrbitDynamics: no environment given");
   std::size_t slots = 0;
   for (auto& model : forces) {
@@ -222,7 +222,28 @@ OrbitDynamics::State OrbitDynamics::completed(const Point& at, const Surrounding
                                               const Memories& memories) const {
   const Vec3 f_ECI = perturbation_ECI(at, around, memories);
   const Vec3 a_ECI = f_ECI + point_mass_ECI(at.orbit.r_ECI);
+  if (variables_ == OrbitVariables::kCartesian) return {at.orbit, {}, {}, a_ECI, a_ECI, memories};
   return {at.orbit, at.elements, at.rate(f_ECI), a_ECI, a_ECI, memories};
+}
+
+OrbitDynamics::Point OrbitDynamics::grid_point(const State& at) const {
+  if (variables_ == OrbitVariables::kCartesian) return {{}, {}, at.orbit};
+  return point(at.orbit.t, at.elements, at.orbit.mass_kg);
+}
+
+OrbitDynamics::Point OrbitDynamics::start_point(const OrbitState& initial) const {
+  if (variables_ == OrbitVariables::kElements) {
+    const QuasiNonsingularElements x = to_quasi_nonsingular(inertial_state(initial));
+    require_above_ground(x, "OrbitDynamics::start");
+    return point(initial.t, x, initial.mass_kg);
+  }
+  if (!(norm(initial.r_ECI) >= kRadiusEarth_m) || !is_finite(initial.r_ECI) ||
+      !is_finite(initial.v_ECI)) {
+    throw std::invalid_argument("OrbitDynamics::start: " + describe(initial) +
+                                "; accepted: finite, |r_ECI| from " +
+                                std::to_string(kRadiusEarth_m) + " m, the ground");
+  }
+  return {{}, {}, initial};
 }
 
 OrbitDynamics::State OrbitDynamics::start(const OrbitState& initial) const {
@@ -230,9 +251,7 @@ OrbitDynamics::State OrbitDynamics::start(const OrbitState& initial) const {
     throw std::invalid_argument("OrbitDynamics::start: mass_kg = " +
                                 std::to_string(initial.mass_kg) + "; accepted: above 0");
   }
-  const QuasiNonsingularElements x = to_quasi_nonsingular(inertial_state(initial));
-  require_above_ground(x, "OrbitDynamics::start");
-  const Point at = point(initial.t, x, initial.mass_kg);
+  const Point at = start_point(initial);
   const Surroundings around = environment_->surroundings(initial.t);
   Memories memories;
   for (const Force& force : forces_) {
@@ -250,22 +269,25 @@ OrbitDynamics::State OrbitDynamics::step(const State& from, SimTime to) const {
   }
 }
 
-OrbitDynamics::State OrbitDynamics::stepped(const State& from, SimTime to) const {
+double OrbitDynamics::mass_kg(const State& from, SimTime t) const {
+  return from.orbit.mass_kg - thrust_.mass_flow_kgps * to_seconds(t - from.orbit.t);
+}
+
+OrbitDynamics::Point OrbitDynamics::stepped_elements(const State& from, SimTime to,
+                                                     const Surroundings& at_end) const {
   const Duration span = to - from.orbit.t;
   const double dt_s = to_seconds(span);
   const double mass_in_middle_kg = from.orbit.mass_kg - thrust_.mass_flow_kgps * (dt_s / 2);
-  const double mass_at_end_kg = from.orbit.mass_kg - thrust_.mass_flow_kgps * dt_s;
-  if (!(mass_at_end_kg > 0)) throw PropagationError("a thrust used up all mass", from.orbit);
+  const double mass_at_end_kg = mass_kg(from, to);
   const SimTime middle = from.orbit.t + span / 2;
   // A force that is switched at `to` still has its old value on the way there.
   const SimTime just_before = to - 1ns;
-  const auto rate_at = [&](SimTime t, const QuasiNonsingularElements& x, double mass_kg,
+  const auto rate_at = [&](SimTime t, const QuasiNonsingularElements& x, double mass,
                            const Surroundings& around) {
-    const Point at = checked_point(t, x, mass_kg, from);
+    const Point at = checked_point(t, x, mass, from);
     return at.rate(perturbation_ECI(at, around, from.memories));
   };
   const Surroundings in_middle = environment_->surroundings(middle);
-  const Surroundings at_end = environment_->surroundings(to);
   const QuasiNonsingularElements& x = from.elements;
   const QuasiNonsingularElements& k1 = from.rate;
   const QuasiNonsingularElements k2 =
@@ -276,8 +298,42 @@ OrbitDynamics::State OrbitDynamics::stepped(const State& from, SimTime to) const
       rate_at(just_before, plus(x, dt_s, k3), mass_at_end_kg, at_end);
   QuasiNonsingularElements next = plus(x, dt_s / 6, weighted(k1, k2, k3, k4));
   next.u_rad = unwound(next.u_rad);
+  return checked_point(to, next, mass_at_end_kg, from);
+}
 
-  Point end = checked_point(to, next, mass_at_end_kg, from);
+OrbitDynamics::Point OrbitDynamics::stepped_cartesian(const State& from, SimTime to,
+                                                      const Surroundings& at_end) const {
+  const Duration span = to - from.orbit.t;
+  const double h = to_seconds(span);
+  const SimTime middle = from.orbit.t + span / 2;
+  const auto checked = [&](SimTime t, const Vec3& r_ECI, const Vec3& v_ECI, double mass) -> Point {
+    if (!(norm(r_ECI) >= kRadiusEarth_m))
+      throw PropagationError("the orbit went below the ground", from.orbit);
+    return {{}, {}, {t, r_ECI, v_ECI, mass}};
+  };
+  const auto acceleration_at = [&](SimTime t, const Vec3& r_ECI, const Vec3& v_ECI,
+                                   const Surroundings& around) {
+    const Point at = checked(t, r_ECI, v_ECI, mass_kg(from, t));
+    return perturbation_ECI(at, around, from.memories) + point_mass_ECI(r_ECI);
+  };
+  const Surroundings in_middle = environment_->surroundings(middle);
+  const Vec3 &r = from.orbit.r_ECI, &v = from.orbit.v_ECI, &a1 = from.a_ECI;
+  const Vec3 v2 = v + (h / 2) * a1;
+  const Vec3 a2 = acceleration_at(middle, r + (h / 2) * v, v2, in_middle);
+  const Vec3 v3 = v + (h / 2) * a2;
+  const Vec3 a3 = acceleration_at(middle, r + (h / 2) * v2, v3, in_middle);
+  const Vec3 v4 = v + h * a3;
+  // A force that is switched at `to` still has its old value on the way there.
+  const Vec3 a4 = acceleration_at(to - 1ns, r + h * v3, v4, at_end);
+  return checked(to, r + (h / 6) * (v + 2 * (v2 + v3) + v4),
+                 v + (h / 6) * (a1 + 2 * (a2 + a3) + a4), mass_kg(from, to));
+}
+
+OrbitDynamics::State OrbitDynamics::stepped(const State& from, SimTime to) const {
+  if (!(mass_kg(from, to) > 0)) throw PropagationError("a thrust used up all mass", from.orbit);
+  const Surroundings at_end = environment_->surroundings(to);
+  Point end = variables_ == OrbitVariables::kCartesian ? stepped_cartesian(from, to, at_end)
+                                                       : stepped_elements(from, to, at_end);
   Memories memories = from.memories;
   for (const Force& force : forces_) {
     if (force.along_orbit == nullptr) continue;
@@ -285,7 +341,7 @@ OrbitDynamics::State OrbitDynamics::stepped(const State& from, SimTime to) const
   }
   State state = completed(end, at_end, memories);
   if (next_discontinuity(from.orbit.t) == to) {
-    end.orbit.t = just_before;
+    end.orbit.t = to - 1ns;
     state.a_before_ECI =
         perturbation_ECI(end, at_end, from.memories) + point_mass_ECI(end.orbit.r_ECI);
   }
@@ -322,7 +378,7 @@ OrbitDynamics::State OrbitDynamics::beyond(const State& at, const Crossing& cros
   const Surroundings around = environment_->surroundings(at.orbit.t);
   Memories memories = at.memories;
   memories[force.slot] = force.along_orbit->crossed(at.memories[force.slot], at.orbit, around);
-  State next = completed(point(at.orbit.t, at.elements, at.orbit.mass_kg), around, memories);
+  State next = completed(grid_point(at), around, memories);
   next.a_before_ECI = at.a_before_ECI;
   return next;
 }
@@ -331,13 +387,14 @@ OrbitDynamics::State OrbitDynamics::after_impulse(const State& at, const Vec3& d
   if (!is_finite(dv_ECI))
     throw std::domain_error("OrbitDynamics::after_impulse: dv_ECI is not finite");
   const InertialState kicked{at.orbit.r_ECI, at.orbit.v_ECI + dv_ECI};
-  QuasiNonsingularElements x;
-  try {
-    x = to_quasi_nonsingular(kicked);
-  } catch (const std::invalid_argument& error) {
-    throw PropagationError(std::string("impulse: ") + error.what(), at.orbit);
+  Point after{{}, {}, {at.orbit.t, kicked.r_ECI, kicked.v_ECI, at.orbit.mass_kg}};
+  if (variables_ == OrbitVariables::kElements) {
+    try {
+      after = point(at.orbit.t, to_quasi_nonsingular(kicked), at.orbit.mass_kg);
+    } catch (const std::invalid_argument& error) {
+      throw PropagationError(std::string("impulse: ") + error.what(), at.orbit);
+    }
   }
-  const Point after = point(at.orbit.t, x, at.orbit.mass_kg);
   const Surroundings around = environment_->surroundings(at.orbit.t);
   Memories memories = at.memories;
   for (const Force& force : forces_) {
@@ -373,8 +430,7 @@ void OrbitDynamics::set_thrust(const Thrust& thrust) {
 }
 
 OrbitDynamics::State OrbitDynamics::under_new_thrust(const State& at) const {
-  State next = completed(point(at.orbit.t, at.elements, at.orbit.mass_kg),
-                         environment_->surroundings(at.orbit.t), at.memories);
+  State next = completed(grid_point(at), environment_->surroundings(at.orbit.t), at.memories);
   next.orbit = at.orbit;  // to the bit, after an impulse too
   next.a_before_ECI = at.a_before_ECI;
   return next;

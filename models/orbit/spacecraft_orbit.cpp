@@ -38,7 +38,7 @@ SpacecraftOrbit::SpacecraftOrbit(const OrbitState& initial, SpacecraftOrbitOptio
                                 "; accepted: above 0");
   }
   // Everything that could be wrong shows here rather than at the first look.
-  OrbitDynamics(options_.environment, options_.forces).start(initial_);
+  OrbitDynamics(options_.environment, options_.forces, {}, options_.variables).start(initial_);
 }
 
 void SpacecraftOrbit::add_force(std::shared_ptr<const ForceModel> force) {
@@ -49,7 +49,8 @@ void SpacecraftOrbit::add_force(std::shared_ptr<const ForceModel> force) {
 
 LazySystem<SpacecraftOrbit::Model>& SpacecraftOrbit::system() {
   if (!system_) {
-    OrbitDynamics dynamics(options_.environment, options_.forces, options_.attitude);
+    OrbitDynamics dynamics(options_.environment, options_.forces, options_.attitude,
+                           options_.variables);
     const OrbitDynamics::State start = dynamics.start(initial_);
     system_.emplace(Model(std::move(dynamics)), start, initial_.t, options_.step);
   }

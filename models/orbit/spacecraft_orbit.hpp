@@ -21,6 +21,8 @@ struct SpacecraftOrbitOptions {
   std::shared_ptr<const SpaceEnvironment> environment = {};  // required
   /// Turns body-fixed thrust; without it there can be none. Changes only in change_attitude().
   std::shared_ptr<const AttitudeLaw> attitude = {};
+  /// kCartesian needs 1 s steps for what elements do at 10 s, but takes any orbit.
+  OrbitVariables variables = OrbitVariables::kElements;
 };
 
 /// A LazySystem of OrbitDynamics: its grid is fixed by `step`, by impulses and thrust edges, by the

@@ -1,4 +1,3 @@
-#include <orrery/models/orbit/cartesian_rk4.hpp>
 #include <orrery/models/reference/reference_propagator.hpp>
 
 #include <algorithm>
@@ -21,6 +20,23 @@ Vec3 vector_at(const double* y) {
 
 void put(double* y, const Vec3& v) {
   y[0] = v.x, y[1] = v.y, y[2] = v.z;
+}
+
+Vec3 acceleration_ECI(const OrbitDynamics::Forces& forces, const OrbitState& state,
+                      const Surroundings& around) {
+  const double r = norm(state.r_ECI);
+  Vec3 a_ECI = -kMuEarth_m3ps2 / (r * r * r) * state.r_ECI;
+  for (const auto& force : forces) a_ECI += force->acceleration_ECI(state, around);
+  return a_ECI;
+}
+
+std::optional<SimTime> next_discontinuity(const OrbitDynamics::Forces& forces, SimTime t) {
+  std::optional<SimTime> first;
+  for (const auto& force : forces) {
+    const std::optional<SimTime> next = force->next_discontinuity(t);
+    if (next && (!first || *next < *first)) first = next;
+  }
+  return first;
 }
 
 void require_usable(const ReferenceOptions& options) {
@@ -49,7 +65,7 @@ class ReferencePropagator::Solver {
     if (spacecraft.empty()) throw std::invalid_argument("ReferencePropagator: no spacecraft");
     for (ReferenceSpacecraft& s : spacecraft) {
       // Checks state, forces and environment.
-      CartesianRk4(environment_, s.forces).start(s.initial);
+      OrbitDynamics(environment_, s.forces, {}, OrbitVariables::kCartesian).start(s.initial);
       if (s.initial.t != spacecraft.front().initial.t)
         throw std::invalid_argument("ReferencePropagator: one spacecraft starts at " +
                                     to_string(spacecraft.front().initial.t) + ", another at " +

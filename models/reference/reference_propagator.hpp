@@ -22,8 +22,8 @@ struct ReferenceOptions {
   /// micrometre a step.
   double tolerance = 1e-13;
   /// Above 0. The shortest waves of a 60x60 field pass in 90 s, and the estimate is blind to part
-  /// of them: with steps up to 60 s a day errs by 0.1 mm whatever the tolerance, with 30 s by 1 um.
-  /// Events shorter than a step may be missed.
+  /// of them: with steps up to 60 s a day errs by 0.1 mm whatever the tolerance, with 30 s by some
+  /// um. Events shorter than a step may be missed.
   Duration longest_step = 30s;
   /// Steps of this length instead, without error control: to measure the order of convergence.
   std::optional<Duration> fixed_step = {};
@@ -37,10 +37,12 @@ struct ReferenceOptions {
 ///            step for one that reuses it, and loses an order.
 /// Forces     The same ForceModel list as the truth's propagator, the force itself without memory
 ///            (ForceAlongOrbit). The integration stops where a force jumps and begins anew; so it
-///            does after an impulse and at a thrust edge. The step control sees to the kinks at the
-///            edges of the shadow.
+///            does after an impulse and at a thrust edge. Edges in space (ForceAlongOrbit, those of
+///            the shadow) are left to the step control, which sees part of such a kink: 0.6 mm of a
+///            relative position at 1 km after ten orbits. Find them as events and stop there, as
+///            relative_motion_test.cpp does, where that matters.
 /// Frames     ECI; the point mass by kMuEarth_m3ps2.
-/// Errors     24 h at 550 km in a 60x60 field: 10 um (integrators_test.cpp).
+/// Errors     24 h at 550 km in a 60x60 field: 2 to 15 um, by rounding (integrators_test.cpp).
 /// Not for    Truth: an adaptive step depends on where the caller stops, so that a further look
 ///            changes the last bits. Use SpacecraftOrbit.
 /// Checked by test_suites/validation/models/orbit/integrators_test.cpp, orbit_events_test.cpp
