@@ -11,8 +11,7 @@ namespace orrery {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kTableStep_rad = 0.25 * kDegree;
-constexpr int kTableIntervals = 720;
+constexpr int kTableIntervals = 2048;     // of sqrt(1 - cosine), 0 to sqrt(2)
 constexpr double kChip_m = 293.052;       // of the C/A code
 constexpr double kCodeLoop_Hz = 7.60e-3;  // B d / 2
 constexpr double kPhaseLoop_Hz = 15;
@@ -72,7 +71,10 @@ Cn0Model::Cn0Model(const AntennaPattern& pattern, Cn0Law law) : pattern_(pattern
     }
     slope_ = (kHighestCn0_dBHz - kLowestCn0_dBHz) / span_dB;
   }
-  for (int i = 0; i <= kTableIntervals + 1; ++i) table_.push_back(at_angle(i * kTableStep_rad));
+  for (int i = 0; i <= kTableIntervals + 1; ++i) {
+    const double x = std::numbers::sqrt2 * i / kTableIntervals;
+    table_.push_back(at_angle(std::acos(std::max(1 - x * x, -1.0))));
+  }
 }
 
 double Cn0Model::at_angle(double off_boresight_rad) const {
@@ -80,9 +82,10 @@ double Cn0Model::at_angle(double off_boresight_rad) const {
   return std::clamp(kHighestCn0_dBHz - slope_ * loss_dB, kLowestCn0_dBHz, kHighestCn0_dBHz);
 }
 
-double Cn0Model::operator()(double off_boresight_rad) const {
-  const double at = off_boresight_rad * (1 / kTableStep_rad);
-  const int i = std::clamp(static_cast<int>(at), 0, kTableIntervals);
+double Cn0Model::at_cosine(double cos_off_boresight) const {
+  constexpr double kPerStep = kTableIntervals / std::numbers::sqrt2;
+  const double at = kPerStep * std::sqrt(std::max(1 - cos_off_boresight, 0.0));
+  const int i = std::min(static_cast<int>(at), kTableIntervals);
   const double low = table_[static_cast<std::size_t>(i)];
   return low + (at - i) * (table_[static_cast<std::size_t>(i) + 1] - low);
 }

@@ -64,10 +64,6 @@ Duration until_next_epoch(SimTime now, Duration period) {
   return since_epoch == 0ns ? 0ns : period - since_epoch;
 }
 
-SimTime next_multiple(SimTime t, Duration step) {
-  return t + until_next_epoch(t, step);
-}
-
 // One draw per statement: the order of arguments is the compiler's.
 Vec3 white_noise(RandomStream& stream, double sigma) {
   Vec3 noise;
@@ -149,9 +145,10 @@ void GnssReceiver::power_on(DeviceContext& io) {
         [&io](std::string_view purpose) -> RandomStream& { return io.random(purpose); });
   }
   if (powered_before_) logs_ = {};
+  commands_.emplace(logs_, options_.period);
   for (const novatel::LogRequest& request : requests(options_)) logs_.log(request);
   const GnssStart how = powered_before_ ? GnssStart::kCold : options_.start;
-  restart(io, how);
+  restart(how);
   powered_before_ = true;
   if (how == GnssStart::kCold) return;
   for (int prn = 1; prn <= gps::kSatellites; ++prn) {
@@ -170,7 +167,7 @@ void GnssReceiver::learn(const BroadcastEphemeris& sent) {
   logs_.note_change(novatel::kGpsEphemId);
 }
 
-void GnssReceiver::restart(DeviceContext&, GnssStart how) {
+void GnssReceiver::restart(GnssStart how) {
   tracker_->start(how);
   first_epoch_ = true;
   solution_ = {};
@@ -180,9 +177,15 @@ void GnssReceiver::restart(DeviceContext&, GnssStart how) {
   clock_.jump(clock_noise_->uniform(-5e-4, 5e-4));
 }
 
+void GnssReceiver::from_flight(DeviceContext& io, Bytes bytes) {
+  answers_.clear();
+  commands_->take(bytes, header(io), answers_);
+  if (!answers_.empty()) io.to_flight(answers_);
+}
+
 void GnssReceiver::measure(DeviceContext& io) {
   const double restarted = io.fault("restart", 0.0);
-  if (restarted != 0.0) restart(io, restarted >= 2 ? GnssStart::kCold : GnssStart::kWarm);
+  if (restarted != 0.0) restart(restarted >= 2 ? GnssStart::kCold : GnssStart::kWarm);
   clock_.advance(first_epoch_ ? 0.0 : to_seconds(io.now() - last_epoch_), *clock_noise_);
   clock_.jump(io.fault("clock_jump_s", 0.0));
 
@@ -198,15 +201,18 @@ void GnssReceiver::measure(DeviceContext& io) {
   solve(io, antenna);
   first_epoch_ = false;
   last_epoch_ = io.now();
-  if (!outage) send(io, antenna);
+  if (!outage) send(io);
 }
 
 AntennaPlace GnssReceiver::antenna_place(DeviceContext& io, const Surroundings& around) const {
   const OrbitState body = io.truth();
   const Mat3 R_BI = io.R_BI();
   const Vec3& omega = around.omega_EI_ECEF;
-  const EarthFixedState s = to_earth_fixed(
-      {body.r_ECI + transpose(R_BI) * options_.lever_arm_B, body.v_ECI}, around.R_EI, omega);
+  const Mat3 R_IB = transpose(R_BI);
+  const Vec3& arm_B = options_.lever_arm_B;
+  const EarthFixedState s =
+      to_earth_fixed({body.r_ECI + R_IB * arm_B, body.v_ECI + R_IB * cross(io.omega_BI_B(), arm_B)},
+                     around.R_EI, omega);
   const double r = norm(s.r_ECEF);
   return {io.now(), s.r_ECEF, s.v_ECEF,
           -kMuEarth_m3ps2 / (r * r * r) * s.r_ECEF - 2 * cross(omega, s.v_ECEF) -
@@ -261,11 +267,11 @@ void GnssReceiver::receive_ephemerides(DeviceContext& io) {
     const BroadcastEphemeris* sent = gps_->broadcast(channel.prn, now);
     if (sent == nullptr || sent->iodc == ephemerides_[index].iodc) continue;
     const int now_sent = sent->iodc;  // broadcast() keeps one issue a satellite
-    // Of a frame that began in lock and within this issue.
-    const SimTime frame =
-        next_multiple(std::max(channel.acquired, now - kFrame - kSubframes), kFrame);
+    // The last frame whose subframes have come must have begun in lock and within this issue.
+    const SimTime frame = now - kSubframes - (now - kSubframes).time_since_epoch() % kFrame;
+    if (frame < channel.acquired) continue;
     const BroadcastEphemeris* then = gps_->broadcast(channel.prn, frame);
-    if (frame + kSubframes > now || then == nullptr || then->iodc != now_sent) continue;
+    if (then == nullptr || then->iodc != now_sent) continue;
     if (io.fault(fault_names_[index].withhold, 0.0) != 0.0) continue;
     learn(*then);
   }
@@ -312,7 +318,7 @@ novatel::Header GnssReceiver::header(DeviceContext& io) const {
   return h;
 }
 
-void GnssReceiver::send(DeviceContext& io, const AntennaPlace&) {
+void GnssReceiver::send(DeviceContext& io) {
   frames_.clear();
   const novatel::Header head = header(io);
   for (const novatel::DueLog& log : logs_.due(io.now())) {

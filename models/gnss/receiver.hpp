@@ -4,6 +4,7 @@
 #include <orrery/models/device/device.hpp>
 #include <orrery/models/gnss/antenna.hpp>
 #include <orrery/models/gnss/constellation.hpp>
+#include <orrery/models/gnss/log_command.hpp>
 #include <orrery/models/gnss/log_schedule.hpp>
 #include <orrery/models/gnss/receiver_clock.hpp>
 #include <orrery/models/gnss/tracking.hpp>
@@ -41,8 +42,7 @@ struct SkySector {
 /// say goes to flight software in one piece, at the instant it speaks of.
 ///
 /// Measurements  tracking.hpp, over the constellation that all receivers of a world share. The
-///               antenna is at r + R_BI^T l_B; its motion about the centre of mass is left out of
-///               velocities: 0.12 mm/s with 0.11 m at the rate of the orbit.
+///               antenna is at r + R_BI^T l_B and moves with the body's turning.
 /// Solution      The antenna's true position and velocity plus white noise from the streams
 ///               "position_noise" and "velocity_noise", drawn at every epoch. It needs four
 ///               satellites in lock, healthy, whose ephemerides are known; without, BESTXYZ says
@@ -69,11 +69,14 @@ class GnssReceiver final : public Device {
 
   std::string_view name() const override { return "gnss"; }
   void start(DeviceContext& io) override;
+  /// LOG, UNLOG and UNLOGALL (log_command.hpp); answers go back at once.
+  void from_flight(DeviceContext& io, Bytes bytes) override;
 
   /// The number k for the fault "sector k". @throws std::invalid_argument  an empty sector.
   std::size_t add_sector(const SkySector& sector);
   /// The list of logs, to be changed between epochs as LOG and UNLOG would.
   novatel::LogSchedule& logs() { return logs_; }
+  Duration period() const { return options_.period; }
 
   /// For tests and reports, of the last epoch.
   const GnssTracker* tracker() const { return tracker_ ? &*tracker_ : nullptr; }
@@ -100,7 +103,7 @@ class GnssReceiver final : public Device {
 
   void power_on(DeviceContext& io);
   void measure(DeviceContext& io);
-  void restart(DeviceContext& io, GnssStart how);
+  void restart(GnssStart how);
   AntennaPlace antenna_place(DeviceContext& io, const Surroundings& around) const;
   GnssTracker::Faults tracking_faults(DeviceContext& io, const AntennaPlace& antenna,
                                       const GpsSnapshot& gps) const;
@@ -108,7 +111,7 @@ class GnssReceiver final : public Device {
   void receive_ephemerides(DeviceContext& io);
   void learn(const BroadcastEphemeris& sent);
   void solve(DeviceContext& io, const AntennaPlace& antenna);
-  void send(DeviceContext& io, const AntennaPlace& antenna);
+  void send(DeviceContext& io);
   void append(const novatel::DueLog& log, const novatel::Header& header);
   void append_ephemerides(const novatel::DueLog& log, const novatel::Header& header);
   void append_almanac(const novatel::Header& header);
@@ -121,6 +124,7 @@ class GnssReceiver final : public Device {
   ReceiverClock clock_;
   std::optional<GnssTracker> tracker_;
   novatel::LogSchedule logs_;
+  std::optional<novatel::LogCommandReader> commands_;  // of this power-on
   std::vector<SkySector> sectors_;
   std::vector<std::string> sector_faults_;
   std::array<FaultNames, gps::kSatellites> fault_names_;
@@ -129,7 +133,7 @@ class GnssReceiver final : public Device {
   bool powered_before_ = false, first_epoch_ = true, time_known_ = true;
   SimTime last_epoch_;
   Solution solution_;
-  ByteBuffer frames_;  // kept, so that an epoch costs no allocation
+  ByteBuffer frames_, answers_;  // kept, so that an epoch costs no allocation
 };
 
 }  // namespace orrery

@@ -64,27 +64,32 @@ Sight SightCheck::operator()(const AntennaPlace& antenna, double radius_m,
 }
 
 ReceivedSignal receive(const SatelliteState& satellite, const AntennaPlace& antenna,
-                       double distance_m, double delay_s) {
+                       const Sight& sight, double delay_s) {
   const Vec3 r = antenna.r_ECEF + delay_s * (antenna.v_ECEF + (0.5 * delay_s) * antenna.a_ECEF);
   const Vec3 v = antenna.v_ECEF + delay_s * antenna.a_ECEF;
-  double tau_s = distance_m / kSpeedOfLight_mps, dt_s = 0;
-  Vec3 r_s, d;
+  // During tau the satellite moves in space, where ECEF turns.
+  const Vec3 v_space =
+      satellite.v_ECEF + kOmegaEarth_radps * Vec3{-satellite.r_ECEF.y, satellite.r_ECEF.x, 0};
+  const double u_v = dot(sight.u_ECEF, v_space);
+  const double opening_mps = dot(sight.u_ECEF, satellite.v_ECEF - v);
+  const double tau_s = (sight.distance_m + delay_s * opening_mps) / (kSpeedOfLight_mps + u_v);
+  const double dt_s = delay_s - tau_s;
+  const Vec3 r_s =
+      earth_turned(satellite.r_ECEF + dt_s * (satellite.v_ECEF + (0.5 * dt_s) * satellite.a_ECEF),
+                   kOmegaEarth_radps * tau_s);
+  const Vec3 d = r_s - r;
   ReceivedSignal out;
-  for (int i = 0; i < 2; ++i) {
-    dt_s = delay_s - tau_s;
-    r_s =
-        earth_turned(satellite.r_ECEF + dt_s * (satellite.v_ECEF + (0.5 * dt_s) * satellite.a_ECEF),
-                     kOmegaEarth_radps * tau_s);
-    d = r_s - r;
-    out.range_m = norm(d);
-    tau_s = out.range_m / kSpeedOfLight_mps;
-  }
-  // rho' = u . (v_s (1 - tau') + omega tau' (r_s turning back) - v) with tau' = rho'/c.
-  const Vec3 u = d / out.range_m;
+  const double range_m = norm(d);
+  const Vec3 u = d / range_m;
   const Vec3 v_s =
       earth_turned(satellite.v_ECEF + dt_s * satellite.a_ECEF, kOmegaEarth_radps * tau_s);
   const Vec3 turning_back{kOmegaEarth_radps * r_s.y, -kOmegaEarth_radps * r_s.x, 0};
-  out.range_rate_mps = dot(u, v_s - v) / (1 + dot(u, v_s - turning_back) / kSpeedOfLight_mps);
+  // What tau was wrong by moves the satellite once more, by its velocity in space.
+  const double u_v_space = dot(u, v_s - turning_back);
+  const double correction_s = range_m / kSpeedOfLight_mps - tau_s;
+  out.range_m = range_m - correction_s * u_v_space;
+  // rho' = u . (v_s (1 - tau') + omega tau' (r_s turning back) - v) with tau' = rho'/c.
+  out.range_rate_mps = dot(u, v_s - v) / (1 + u_v_space / kSpeedOfLight_mps);
   out.satellite_clock_s =
       satellite.clock_s +
       dt_s * (satellite.clock_rate_sps + 0.5 * dt_s * satellite.clock_acceleration_sps2);

@@ -131,7 +131,7 @@ void GnssTracker::find_candidates(const GpsSnapshot& gps, const AntennaPlace& an
     if ((gps.transmitting & ~blocked & bit) == 0) continue;
     const Sight sight = sight_(antenna, radius_m, gps[prn].r_ECEF);
     if (!sight.clear) continue;
-    const double cn0 = cn0_(std::acos(std::min(sight.cos_off_boresight, 1.0)));
+    const double cn0 = cn0_.at_cosine(sight.cos_off_boresight);
     const double bonus = (followed & bit) != 0 ? options_.hysteresis_dB : 0;
     candidates_.push_back({prn, cn0 + bonus, sight, cn0});
     in_sight_ |= bit;
@@ -268,7 +268,7 @@ void GnssTracker::measure(GnssChannel& channel, const Epoch& e) {
   const Candidate& c = *candidate(channel.prn);
   const SatelliteState& truth = e.gps[channel.prn];
   // The receiver's clock shows the tag when GPS time is the tag less the bias.
-  const ReceivedSignal signal = receive(truth, e.antenna, c.sight.distance_m, -e.bias_s);
+  const ReceivedSignal signal = receive(truth, e.antenna, c.sight, -e.bias_s);
   if (options_.wind_up) {
     const double w = wind_up_cycles(truth.r_ECEF, e.r_sun_ECEF, e.antenna);
     channel.wind_up_cycles = w + std::round(channel.wind_up_cycles - w);

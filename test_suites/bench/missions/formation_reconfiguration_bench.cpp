@@ -57,5 +57,33 @@ BENCHMARK_CAPTURE(BM_FirstFlight, formation_keeping, std::string("formation_keep
 BENCHMARK_CAPTURE(BM_FirstFlight, without_flight_software, std::string())
     ->Unit(benchmark::kMillisecond);
 
+/// Two spacecraft with all models and no flight software: orbits in 60x60, receivers that track,
+/// solve and log RANGE, BESTXYZ and ephemerides at every epoch.
+void BM_TwoSpacecraft_Gnss(benchmark::State& state) {
+  using novatel::LogTrigger;
+  const Duration period = state.range(0) * 1s, span = 6h;
+  double simulated_s = 0;
+  for (auto _ : state) {
+    state.PauseTiming();
+    FormationOptions options;
+    options.world.record = false;
+    options.gnss.period = period;
+    options.gnss.logs = {{novatel::kRangeId, LogTrigger::kOnTime, period},
+                         {novatel::kBestXyzId, LogTrigger::kOnTime, period},
+                         {novatel::kRawEphemId, LogTrigger::kOnChanged}};
+    FormationWorld world(options);
+    state.ResumeTiming();
+    world.run_for(span);
+    simulated_s += to_seconds(span);
+  }
+  state.counters["x_real_time"] = benchmark::Counter(simulated_s, benchmark::Counter::kIsRate);
+}
+BENCHMARK(BM_TwoSpacecraft_Gnss)
+    ->ArgName("period_s")
+    ->Arg(1)
+    ->Arg(10)
+    ->Arg(30)
+    ->Unit(benchmark::kMillisecond);
+
 }  // namespace
 }  // namespace orrery

@@ -3,68 +3,15 @@
 
 #include <benchmark/benchmark.h>
 
-#include <cmath>
 #include <memory>
 #include <vector>
+
+#include "../../../unit/models/support/orbiting_device_context.hpp"
 
 namespace orrery {
 namespace {
 
-const SimTime kEpoch = gps_midnight(2025, 3, 20);
-
-/// A circular orbit of 550 km over an Earth that does not turn, pointing to the zenith: costs next
-/// to nothing itself.
-class BenchContext final : public DeviceContext {
- public:
-  explicit BenchContext(std::uint64_t seed) : streams_(seed) {}
-
-  void set(SimTime t) {
-    now_ = t;
-    const double u = 1.0951e-3 * to_seconds(t - kEpoch), c = std::cos(u), s = std::sin(u);
-    state_ = {t, {6928137 * c, 0, 6928137 * s}, {-7585 * s, 0, 7585 * c}, 11};
-    R_BI_ = {{-s, 0, c}, {0, -1, 0}, {c, 0, s}};
-  }
-  void epoch() { every_(); }
-  std::size_t bytes() const { return bytes_; }
-
-  std::string_view spacecraft() const override { return "chief"; }
-  SimTime now() const override { return now_; }
-  std::int64_t onboard_ns() const override { return to_ns(now_); }
-  SimTime truth_of_onboard(std::int64_t ns) const override { return from_ns(ns); }
-  OrbitState truth() const override { return state_; }
-  Surroundings surroundings() const override {
-    return {.omega_EI_ECEF = {0, 0, 7.292e-5}, .r_sun_ECI = {1.5e11, 0, 0}};
-  }
-  Mat3 R_BI() const override { return R_BI_; }
-  Vec3 omega_BI_B() const override { return {0, 1.0951e-3, 0}; }
-  RandomStream& random(std::string_view purpose) override {
-    return streams_.stream("chief", "gnss", purpose);
-  }
-  EventHandle after(Duration, Action action) override {
-    action();
-    return {};
-  }
-  EventHandle every(Duration, Action action) override {
-    every_ = std::move(action);
-    return {};
-  }
-  bool cancel(EventHandle) override { return false; }
-  void to_flight(Bytes bytes) override { bytes_ += bytes.size(); }
-  void transmit(std::string_view, Bytes) override {}
-  void apply_impulse(const Vec3&) override {}
-  void set_thrust(const Thrust&) override {}
-  void record(std::string_view, double) override {}
-  void log(int, std::string_view) override {}
-  double fault(std::string_view, double nominal) const override { return nominal; }
-
- private:
-  SimTime now_ = kEpoch;
-  OrbitState state_;
-  Mat3 R_BI_;
-  RandomStreams streams_;
-  Action every_;
-  std::size_t bytes_ = 0;
-};
+const SimTime kEpoch = OrbitingDeviceContext::kEpoch;
 
 GnssReceiverOptions ranging(Duration period) {
   using novatel::LogTrigger;
@@ -82,10 +29,10 @@ void BM_GnssReceiver_Epoch(benchmark::State& state) {
   const Duration period = state.range(1) * 1s;
   RandomStreams streams(1);
   const auto gps = std::make_shared<GpsConstellation>(GpsConstellationOptions{}, kEpoch, streams);
-  std::vector<std::unique_ptr<BenchContext>> contexts;
+  std::vector<std::unique_ptr<OrbitingDeviceContext>> contexts;
   std::vector<std::unique_ptr<GnssReceiver>> devices;
   for (std::size_t i = 0; i < receivers; ++i) {
-    contexts.push_back(std::make_unique<BenchContext>(i + 1));
+    contexts.push_back(std::make_unique<OrbitingDeviceContext>(i + 1));
     devices.push_back(std::make_unique<GnssReceiver>(ranging(period), gps));
     devices.back()->start(*contexts.back());
   }
