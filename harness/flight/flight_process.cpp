@@ -310,9 +310,10 @@ void FlightProcess::Impl::tell_of_block(const void* address) {
   crash.block_freed_by = frames(site->freed_by);
 }
 
-std::vector<StackFrame> FlightProcess::Impl::frames(const CallStack& stack) const {
+std::vector<StackFrame> FlightProcess::Impl::frames(const CallStack& calls_made) const {
   internal::CrashCapture capture;
-  for (const void* frame : stack) capture.frames[capture.frame_count++] = const_cast<void*>(frame);
+  for (const void* frame : calls_made)
+    capture.frames[capture.frame_count++] = const_cast<void*>(frame);
   return internal::stack_frames(capture, library->loaded_paths());
 }
 
