@@ -104,7 +104,8 @@ int almanac_week(const GpsAlmanacEntry& entry, int epoch_week, bool shift) {
   return epoch_week - (behind > 512 ? behind - 1024 : behind < -512 ? behind + 1024 : behind);
 }
 
-/// Moves a state by a vector that is constant in RTN; RTN turns with h/r^2.
+/// Moves a state by a vector that is constant in RTN; RTN turns with h/r^2. The node's precession,
+/// 8e-9 rad/s, is left out of the derivatives: 1e-8 m/s for a metre, and 1e-6 m between knots.
 void move(SatelliteState& s, const Vec3& d_RTN) {
   const Vec3 omega_E{0, 0, gps::kOmegaEarth_radps};
   const Vec3 h = cross(s.r_ECEF, s.v_ECEF + cross(omega_E, s.r_ECEF));

@@ -31,8 +31,8 @@ Vec3 in_RTN(const Vec3& d, const SatelliteState& s) {
 
 // Quintic Hermite over h = 120 s: h^6/46080 times the sixth derivative, at most 2.7e7 m
 // (2.2e-4/s)^6 = 3e-15 m/s^6 (retrograde part of the motion in ECEF, a fifth of it), so 1e-7 m;
-// beside it rounding at 2.7e7 m, 4 nm a coordinate. With the perturbation, whose frame follows the
-// orbit, seen: 8e-7 m, a hundredth of the guard.
+// beside it rounding at 2.7e7 m, 4 nm a coordinate. With the perturbation, whose derivatives
+// leave out the node's precession, seen: 8e-7 m, a hundredth of the guard.
 TEST(GpsConstellationTest, InterpolatedOrbitsAreThoseOfTheUserAlgorithm) {
   GpsConstellation gps = make({.sigma_orbit_m = 0});
   double worst_m = 0, worst_clock_m = 0, worst_v = 0;
