@@ -49,7 +49,7 @@ class Defective {
   std::uint32_t misbehave(Bytes message);
 
   Host host_;
-  Solution* solution_ = nullptr;  // of the GNSS receiver; none yet
+  [[maybe_unused]] Solution* solution_ = nullptr;  // of the GNSS receiver; none yet
 };
 
 #if DEFECT == NULL_DEREFERENCE

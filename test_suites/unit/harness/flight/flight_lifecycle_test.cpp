@@ -247,7 +247,7 @@ TEST_P(FlightLifecycleTest, ResetsThatMakeNoSenseAreRefused) {
 }
 
 TEST_P(FlightLifecycleTest, ManyRebootsAreTheSameEveryTime) {
-  const auto fingerprint = [this] {
+  const auto fingerprint = [] {
     EventLoop loop(kStart);
     const OwnerId owner = loop.add_owner("dsc");
     FlightComputer computer(loop, owner,
