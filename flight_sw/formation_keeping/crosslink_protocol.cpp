@@ -14,8 +14,7 @@ constexpr std::uint32_t kWindow = 64;
 
 bool is_sound(const unsigned char* message, std::uint32_t bytes, Role peer) {
   if (bytes != kCrosslinkBytes) return false;
-  if (orrery_get_u32(message + kCrcAt) != flight_crc32_common(message, kCrcAt))
-    return false;
+  if (orrery_get_u32(message + kCrcAt) != flight_crc32_common(message, kCrcAt)) return false;
   for (int k = 0; k < 3; ++k) {
     if (message[k] != kMagicAndVersion[k]) return false;
   }

@@ -20,8 +20,8 @@
 
 #include <cstdint>
 
-#include "gnss_fix.hpp"
 #include "gaussian.hpp"
+#include "gnss_fix.hpp"
 
 namespace formation_keeping {
 

@@ -17,8 +17,8 @@ struct Nrlmsise00AtmosphereOptions {
 /// geodetic
 ///            place on WGS 84; local time = UTC + longitude / 15, without the equation of time. The
 ///            day is a whole number, as in the published model, so that density steps by up to 1 %
-///            at midnight UTC: next_discontinuity() says when. Angles are handed over so that a turn
-///            is a turn: the published model's rounded rates make steps of up to 1e-5 at local
+///            at midnight UTC: next_discontinuity() says when. Angles are handed over so that a
+///            turn is a turn: the published model's rounded rates make steps of up to 1e-5 at local
 ///            midnight and at the date line.
 /// Valid for  heights of 0 to 1000 km, and instants that `weather` covers.
 class Nrlmsise00Atmosphere final : public AtmosphereModel {

@@ -34,8 +34,8 @@ struct EarthForcesOptions {
   std::function<Vec3(SimTime, const Vec3& r_ECEF)> wind_ECEF = {};  // drag_force.hpp
 };
 
-/// Gravity field, atmosphere, Sun and Moon are shared by all spacecraft; drag and radiation pressure
-/// are each one's own.
+/// Gravity field, atmosphere, Sun and Moon are shared by all spacecraft; drag and radiation
+/// pressure are each one's own.
 class EarthForces {
  public:
   /// @throws std::out_of_range  gravity_degree.

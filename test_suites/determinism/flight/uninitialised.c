@@ -23,8 +23,19 @@ static int32_t tick(void* self, int64_t now_ns) {
   host->request_tick(host->context, now_ns + (int64_t)1000000000 * 10);
   return ORRERY_OK;
 }
-static void destroy(void* self) { (void)self; }
-static const orrery_flight library = {
-    sizeof(orrery_flight), ORRERY_ABI_VERSION, "uninitialised", "1.0", ports, 1, create, input,
-    tick,                  destroy};
-const orrery_flight* orrery_flight_entry(void) { return &library; }
+static void destroy(void* self) {
+  (void)self;
+}
+static const orrery_flight library = {sizeof(orrery_flight),
+                                      ORRERY_ABI_VERSION,
+                                      "uninitialised",
+                                      "1.0",
+                                      ports,
+                                      1,
+                                      create,
+                                      input,
+                                      tick,
+                                      destroy};
+const orrery_flight* orrery_flight_entry(void) {
+  return &library;
+}
