@@ -8,6 +8,40 @@
 #include <memory>
 
 namespace orrery::internal {
+namespace {
+
+// What lies between a library's variables is forbidden ground under AddressSanitizer, to memcpy and
+// memcmp as well; a function of our own may read it.
+#ifdef __SANITIZE_ADDRESS__
+[[gnu::no_sanitize_address]] std::byte read(const volatile std::byte* from) {
+  return *from;
+}
+
+void copy(const std::byte* from, std::vector<std::byte>& to) {
+  for (std::size_t i = 0; i < to.size(); ++i) to[i] = read(from + i);
+}
+
+bool equal(const std::byte* a, const std::vector<std::byte>& b) {
+  for (std::size_t i = 0; i < b.size(); ++i) {
+    if (read(a + i) != b[i]) return false;
+  }
+  return true;
+}
+#else
+std::byte read(const std::byte* from) {
+  return *from;
+}
+
+void copy(const std::byte* from, std::vector<std::byte>& to) {
+  std::memcpy(to.data(), from, to.size());
+}
+
+bool equal(const std::byte* a, const std::vector<std::byte>& b) {
+  return std::memcmp(a, b.data(), b.size()) == 0;
+}
+#endif
+
+}  // namespace
 
 GlobalsWatch::GlobalsWatch(const std::string& path, std::uintptr_t base, const void* ignored,
                            std::size_t ignored_bytes)
@@ -17,18 +51,19 @@ GlobalsWatch::GlobalsWatch(const std::string& path, std::uintptr_t base, const v
       ignored_bytes_(ignored_bytes) {
   for (const ElfImage::AddressRange& range : image_.writable_data()) {
     const auto* begin = reinterpret_cast<const std::byte*>(base + range.begin);
-    ranges_.push_back({begin, std::vector<std::byte>(begin, begin + (range.end - range.begin))});
+    ranges_.push_back({begin, std::vector<std::byte>(range.end - range.begin)});
+    copy(begin, ranges_.back().content);
   }
 }
 
 std::string GlobalsWatch::changed() const {
   for (const Range& range : ranges_) {
-    if (std::memcmp(range.begin, range.content.data(), range.content.size()) == 0) continue;
+    if (equal(range.begin, range.content)) continue;
     for (std::size_t i = 0; i < range.content.size(); ++i) {
       const std::byte* address = range.begin + i;
       const bool may =
           ignored_ != nullptr && address >= ignored_ && address < ignored_ + ignored_bytes_;
-      if (!may && *address != range.content[i]) return name_of(address);
+      if (!may && read(address) != range.content[i]) return name_of(address);
     }
   }
   return "";
