@@ -15,10 +15,10 @@ namespace orrery {
 
 /// What NRLMSISE-00 asks for; ranges as in Nrlmsise00Input.
 struct SpaceWeatherIndices {
-  double f107_sfu = 150;                // observed, of the UT day before
-  double f107a_sfu = 150;               // observed, mean of the 81 days centred on the UT day
-  double ap_daily = 15;                 // of the UT day [2 nT]
-  std::optional<ApHistory> ap_history;  // where the source has three-hourly values
+  double f107_sfu = 150;                     // observed, of the UT day before
+  double f107a_sfu = 150;                    // observed, mean of the 81 days centred on the UT day
+  double ap_daily = 15;                      // of the UT day [2 nT]
+  std::optional<ApHistory> ap_history = {};  // where the source has three-hourly values
 };
 
 /// A table of days, or a constant. A value: copies are independent, lookups are pure and take no
