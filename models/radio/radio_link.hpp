@@ -26,7 +26,7 @@ struct LogNormalDelay {
 LogNormalDelay log_normal_delay(double low_s, double high_s, double k = 3);
 
 struct RadioLinkOptions {
-  LogNormalDelay delay;           // median 1 s; 99.7 % within 0.1 s to 10 s
+  LogNormalDelay delay = {};      // median 1 s; 99.7 % within 0.1 s to 10 s
   Duration minimum_delay = 1ms;   // no message arrives sooner; at least 0
   double p_on = 0.05;             // blackout begins with this probability per message, 0 to 1
   double p_off = 0.25;            // and ends with this one, 0 to 1
