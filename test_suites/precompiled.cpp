@@ -1,2 +1,4 @@
 // Carries the precompiled header of all suites (orrery_precompile_for_suites).
-int main() { return 0; }
+int main() {
+  return 0;
+}

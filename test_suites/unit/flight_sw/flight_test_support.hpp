@@ -7,8 +7,8 @@
 #include <cstring>
 #include <vector>
 
-#include "formation_keeping/gnss_fix.hpp"
 #include "formation_keeping/constants.hpp"
+#include "formation_keeping/gnss_fix.hpp"
 #include "formation_keeping/relative_elements.hpp"
 #include "orrery_messages.h"
 

@@ -30,8 +30,16 @@ static void destroy(void* self) {
   (void)self;
 }
 
-static const orrery_flight flight = {
-    sizeof(orrery_flight), ORRERY_ABI_VERSION, "worker", "1.0", ports, 2, create, input, 0, destroy};
+static const orrery_flight flight = {sizeof(orrery_flight),
+                                     ORRERY_ABI_VERSION,
+                                     "worker",
+                                     "1.0",
+                                     ports,
+                                     2,
+                                     create,
+                                     input,
+                                     0,
+                                     destroy};
 
 const orrery_flight* orrery_flight_entry(void) {
   return &flight;
