@@ -1,106 +1,32 @@
 #include <orrery/models/atmosphere/space_weather.hpp>
 #include <orrery/models/data/embedded_tables.hpp>
+#include <orrery/models/text/numbered_lines.hpp>
 
 #include <array>
-#include <charconv>
 #include <chrono>
-#include <cmath>
-#include <cstdio>
-#include <fstream>
-#include <sstream>
-#include <stdexcept>
 
 namespace orrery {
 namespace {
 
+using text::NumberedLines;
+using text::quoted;
+using text::trimmed;
+
 // What no index has ever exceeded by far; above, a file is damaged.
 constexpr double kHighestFlux_sfu = 2000, kHighestAp = 400;
 
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlanks = " \t";
-  const std::size_t first = text.find_first_not_of(kBlanks);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
+constexpr const char* kReader = "SpaceWeather";
+
+int days_since_1970(const NumberedLines& lines, int year, int month, int day) {
+  const std::chrono::year_month_day date{std::chrono::year(year),
+                                         std::chrono::month(static_cast<unsigned>(month)),
+                                         std::chrono::day(static_cast<unsigned>(day))};
+  if (!date.ok()) {
+    lines.fail("no such date: " + std::to_string(year) + "-" + std::to_string(month) + "-" +
+               std::to_string(day));
+  }
+  return static_cast<int>(std::chrono::sys_days(date).time_since_epoch().count());
 }
-
-/// Text from a file, which may be anything, in a message: printable and short.
-std::string quoted(std::string_view text) {
-  constexpr std::size_t kLongest = 40;
-  std::string out = "'";
-  for (const char c : text.substr(0, kLongest)) out += c >= ' ' && c <= '~' ? c : '?';
-  return out + (text.size() > kLongest ? "...'" : "'");
-}
-
-template <class Number>
-std::optional<Number> number_in(std::string_view text) {
-  Number value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size()) return {};
-  return value;
-}
-
-/// Hands out a text line by line and knows which one, for the messages.
-class LineReader {
- public:
-  LineReader(std::string_view text, std::string_view source) : text_(text), source_(source) {}
-
-  const std::string& source() const { return source_; }
-
-  [[noreturn]] void fail(const std::string& what) const {
-    throw std::invalid_argument("SpaceWeather: " + source_ + ", line " + std::to_string(line_) +
-                                ": " + what);
-  }
-
-  /// Without its end; nothing at the end of the text.
-  std::optional<std::string_view> next() {
-    if (text_.empty()) return {};
-    ++line_;
-    const std::size_t end = text_.find('\n');
-    // A number cut in the middle still reads as a number: only the line end shows that it is whole.
-    if (end == std::string_view::npos) fail("cut short: the last line has no line end");
-    std::string_view line = text_.substr(0, end);
-    text_.remove_prefix(end + 1);
-    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
-    return line;
-  }
-
-  double real(std::string_view name, std::string_view field, double low, double high) const {
-    const std::string_view text = trimmed(field);
-    const std::optional<double> value = number_in<double>(text);
-    if (!value || !(*value >= low && *value <= high)) {
-      char range[80];
-      std::snprintf(range, sizeof range, "; accepted: %g to %g", low, high);
-      fail(std::string(name) + " is " + quoted(text) + range);
-    }
-    return *value;
-  }
-
-  int whole(std::string_view name, std::string_view field, int low, int high) const {
-    const std::string_view text = trimmed(field);
-    const std::optional<int> value = number_in<int>(text);
-    if (!value || *value < low || *value > high) {
-      fail(std::string(name) + " is " + quoted(text) + "; accepted: a whole number, " +
-           std::to_string(low) + " to " + std::to_string(high));
-    }
-    return *value;
-  }
-
-  int days_since_1970(int year, int month, int day) const {
-    const std::chrono::year_month_day date{std::chrono::year(year),
-                                           std::chrono::month(static_cast<unsigned>(month)),
-                                           std::chrono::day(static_cast<unsigned>(day))};
-    if (!date.ok()) {
-      fail("no such date: " + std::to_string(year) + "-" + std::to_string(month) + "-" +
-           std::to_string(day));
-    }
-    return static_cast<int>(std::chrono::sys_days(date).time_since_epoch().count());
-  }
-
- private:
-  std::string_view text_;
-  std::string source_;
-  std::size_t line_ = 0;
-};
 
 constexpr int kFirstYear = 1900, kLastYear = 2200;
 
@@ -111,7 +37,7 @@ constexpr int kFirstYear = 1900, kLastYear = 2200;
 /// The layout is fixed columns: FORMAT(I4,I3,I3,I5,I3,8I3,I4,8I4,I4,F4.1,I2,I4,F6.1,I2,5F6.1).
 class CelestrakReader {
  public:
-  CelestrakReader(std::string_view text, std::string_view source) : lines_(text, source) {}
+  CelestrakReader(std::string_view text, std::string_view source) : lines_(text, kReader, source) {}
 
   SpaceWeather read() {
     expect_first_line();
@@ -131,7 +57,7 @@ class CelestrakReader {
   using Fields = std::array<std::string_view, kWidths.size()>;
 
   void expect_first_line() {
-    const std::optional<std::string_view> line = lines_.next();
+    const std::optional<std::string_view> line = lines_.next_whole();
     if (!line || *line != "DATATYPE CssiSpaceWeather") {
       lines_.fail("not a CelesTrak space-weather file: it starts with DATATYPE CssiSpaceWeather");
     }
@@ -139,7 +65,7 @@ class CelestrakReader {
 
   /// The next line that is neither empty nor a comment.
   std::optional<std::string_view> next_keyword() {
-    while (const std::optional<std::string_view> line = lines_.next()) {
+    while (const std::optional<std::string_view> line = lines_.next_whole()) {
       if (trimmed(*line).empty() || line->front() == '#') continue;
       const bool known = line->substr(0, 8) == "VERSION " || line->substr(0, 8) == "UPDATED " ||
                          line->substr(0, 4) == "NUM_";
@@ -159,10 +85,10 @@ class CelestrakReader {
       lines_.fail("unknown: " + quoted(head));
     }
     const std::string name(keyword.substr(4, keyword.size() - 4 - kPoints.size()));
-    const int announced = lines_.whole(keyword, head.substr(blank), 1, 1'000'000);
+    const int announced = lines_.integer(head.substr(blank), keyword, 1, 1'000'000);
     begin_section(name);
     for (int i = 0; i < announced; ++i) read_row(name, i, announced);
-    if (lines_.next() != "END " + name) {
+    if (lines_.next_whole() != "END " + name) {
       lines_.fail("END " + name + " is missing: more lines than the " + std::to_string(announced) +
                   " announced, or cut short");
     }
@@ -178,19 +104,19 @@ class CelestrakReader {
           "MONTHLY_PREDICTED");
     }
     seen_observed_ = true;
-    if (lines_.next() != "BEGIN " + name) lines_.fail("BEGIN " + name + " is missing");
+    if (lines_.next_whole() != "BEGIN " + name) lines_.fail("BEGIN " + name + " is missing");
   }
 
   void read_row(const std::string& section, int number, int announced) {
-    const std::optional<std::string_view> line = lines_.next();
+    const std::optional<std::string_view> line = lines_.next_whole();
     if (!line || line->substr(0, 4) == "END ") {
       lines_.fail(section + " ends after " + std::to_string(number) + " of " +
                   std::to_string(announced) + " announced lines");
     }
     const Fields fields = split(*line);
-    const int day = lines_.days_since_1970(lines_.whole("year", fields[0], kFirstYear, kLastYear),
-                                           lines_.whole("month", fields[1], 1, 12),
-                                           lines_.whole("day", fields[2], 1, 31));
+    const int day = days_since_1970(
+        lines_, lines_.integer(fields[0], "year", kFirstYear, kLastYear),
+        lines_.integer(fields[1], "month", 1, 12), lines_.integer(fields[2], "day", 1, 31));
     if (section == "MONTHLY_PREDICTED") return;
     append(day, fields);
   }
@@ -207,7 +133,7 @@ class CelestrakReader {
       at += kWidths[i];
       // Fields we do not use may be blank, but a line shifted by a column must not pass.
       if (!trimmed(fields[i]).empty()) {
-        lines_.real("column " + std::to_string(at), fields[i], 0, 1e5);
+        lines_.real(fields[i], "column " + std::to_string(at), 0, 1e5);
       }
     }
     return fields;
@@ -221,12 +147,12 @@ class CelestrakReader {
                   " days off");
     }
     SpaceWeather::Day out{};
-    out.f107_sfu = lines_.real("observed F10.7", fields[kObservedFlux], 1, kHighestFlux_sfu);
+    out.f107_sfu = lines_.real(fields[kObservedFlux], "observed F10.7", 1, kHighestFlux_sfu);
     out.f107a_sfu =
-        lines_.real("observed 81-day mean of F10.7", fields[kObservedMean], 1, kHighestFlux_sfu);
-    out.ap_daily = lines_.whole("mean ap", fields[kMeanAp], 0, 400);
+        lines_.real(fields[kObservedMean], "observed 81-day mean of F10.7", 1, kHighestFlux_sfu);
+    out.ap_daily = lines_.integer(fields[kMeanAp], "mean ap", 0, 400);
     for (std::size_t k = 0; k < out.ap.size(); ++k) {
-      out.ap[k] = lines_.whole("ap", fields[kFirstAp + k], 0, 400);
+      out.ap[k] = lines_.integer(fields[kFirstAp + k], "ap", 0, 400);
     }
     weather_.days_.push_back(out);
   }
@@ -243,7 +169,7 @@ class CelestrakReader {
     return std::move(weather_);
   }
 
-  LineReader lines_;
+  NumberedLines lines_;
   SpaceWeather weather_;
   bool seen_observed_ = false;
 };
@@ -252,15 +178,15 @@ class CelestrakReader {
 
 class MonthlyReader {
  public:
-  MonthlyReader(std::string_view text, std::string_view source) : lines_(text, source) {}
+  MonthlyReader(std::string_view text, std::string_view source) : lines_(text, kReader, source) {}
 
   SpaceWeather read() {
     constexpr std::string_view kHeader = "year,month,f107_obs_monthly_mean,ap_monthly_mean";
-    const std::optional<std::string_view> header = lines_.next();
+    const std::optional<std::string_view> header = lines_.next_whole();
     if (!header || *header != kHeader) {
       lines_.fail("the first line is not " + std::string(kHeader));
     }
-    while (const std::optional<std::string_view> line = lines_.next())
+    while (const std::optional<std::string_view> line = lines_.next_whole())
       append_month(fields_of(*line));
     return finish();
   }
@@ -285,13 +211,13 @@ class MonthlyReader {
   }
 
   void append_month(const Fields& fields) {
-    const int year = lines_.whole("year", fields[0], kFirstYear, kLastYear);
-    const int month = lines_.whole("month", fields[1], 1, 12);
-    const double f107 = lines_.real("F10.7", fields[2], 1, kHighestFlux_sfu);
-    const double ap = lines_.real("Ap", fields[3], 0, kHighestAp);
-    const int first = lines_.days_since_1970(year, month, 1);
-    const int next = month == 12 ? lines_.days_since_1970(year + 1, 1, 1)
-                                 : lines_.days_since_1970(year, month + 1, 1);
+    const int year = lines_.integer(fields[0], "year", kFirstYear, kLastYear);
+    const int month = lines_.integer(fields[1], "month", 1, 12);
+    const double f107 = lines_.real(fields[2], "F10.7", 1, kHighestFlux_sfu);
+    const double ap = lines_.real(fields[3], "Ap", 0, kHighestAp);
+    const int first = days_since_1970(lines_, year, month, 1);
+    const int next = month == 12 ? days_since_1970(lines_, year + 1, 1, 1)
+                                 : days_since_1970(lines_, year, month + 1, 1);
     if (weather_.days_.empty()) weather_.first_day_ = first;
     if (first != weather_.first_day_ + static_cast<int>(weather_.days_.size())) {
       lines_.fail("the month does not follow the one before");
@@ -316,7 +242,7 @@ class MonthlyReader {
 
   SpaceWeather::Day& day(int index) { return weather_.days_[static_cast<std::size_t>(index)]; }
 
-  LineReader lines_;
+  NumberedLines lines_;
   SpaceWeather weather_;
 };
 
@@ -330,13 +256,7 @@ SpaceWeather SpaceWeather::parse_monthly(std::string_view text, std::string_view
 }
 
 SpaceWeather SpaceWeather::load_celestrak(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();  // unlike an iterator it does not throw where the path is a folder's
-  if (!file.is_open() || text.bad() || text.str().empty()) {
-    throw std::invalid_argument("SpaceWeather::load_celestrak: cannot read '" + path + "'");
-  }
-  return parse_celestrak(text.str(), path);
+  return parse_celestrak(text::read_file(path, "SpaceWeather::load_celestrak"), path);
 }
 
 SpaceWeather SpaceWeather::parse_celestrak(std::string_view text, std::string_view source_name) {

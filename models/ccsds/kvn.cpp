@@ -2,19 +2,16 @@
 #include <orrery/models/ccsds/kvn.hpp>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <stdexcept>
 
 namespace orrery::ccsds {
+
+using text::trimmed;
+
 namespace {
 
-constexpr std::string_view kBlanks = " \t\r";
 constexpr std::string_view kComment = "COMMENT";
-
-bool is_text(char c) {
-  return (c >= ' ' && c <= '~') || c == '\t' || c == '\r';
-}
 
 bool is_keyword(std::string_view word) {
   return !word.empty() && std::all_of(word.begin(), word.end(), [](char c) {
@@ -27,90 +24,40 @@ bool stands_alone(std::string_view keyword) {
          keyword == "COVARIANCE_STOP";
 }
 
-std::string_view trimmed(std::string_view text) {
-  text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
-  return text.substr(0, text.find_last_not_of(kBlanks) + 1);
-}
-
-template <class Number>
-std::optional<Number> whole_number_in(std::string_view word) {
-  Number value{};
-  if (word.size() > 1 && word.front() == '+' && word[1] != '-') word.remove_prefix(1);
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error != std::errc{} || end != word.data() + word.size()) return {};
-  return value;
-}
-
 bool is_comment(std::string_view line) {
   return line.starts_with(kComment) &&
-         (line.size() == kComment.size() || kBlanks.find(line[kComment.size()]) != kBlanks.npos);
+         (line.size() == kComment.size() || line[kComment.size()] == ' ' ||
+          line[kComment.size()] == '\t');
 }
 
 }  // namespace
 
-std::vector<std::string_view> words_of(std::string_view line) {
-  std::vector<std::string_view> words;
-  for (line = trimmed(line); !line.empty(); line = trimmed(line)) {
-    words.push_back(line.substr(0, line.find_first_of(kBlanks)));
-    line.remove_prefix(words.back().size());
-  }
-  return words;
-}
-
-std::string quoted(std::string_view text) {
-  constexpr std::size_t kLongest = 40;
-  std::string shown(text.substr(0, kLongest));
-  for (char& c : shown) {
-    if (!is_text(c)) c = '?';
-  }
-  return "'" + shown + (text.size() > kLongest ? "..." : "") + "'";
-}
-
 // ---- reading
-
-KvnLines::KvnLines(std::string_view text, std::string_view reader, std::string_view source)
-    : text_(text), prefix_(std::string(reader) + ": " + std::string(source)) {}
-
-void KvnLines::fail(int line, const std::string& what) const {
-  throw std::invalid_argument(prefix_ + ", line " + std::to_string(line) + ": " + what);
-}
-
-std::optional<std::string_view> KvnLines::next_raw_line() {
-  if (text_.empty()) return {};
-  ++number_;
-  const std::size_t end = text_.find('\n');
-  const std::string_view line = text_.substr(0, end);
-  text_.remove_prefix(end == std::string_view::npos ? text_.size() : end + 1);
-  const auto strange = std::find_if_not(line.begin(), line.end(), is_text);
-  if (strange != line.end())
-    fail("byte 0x" + hex_digits(static_cast<unsigned char>(*strange), 2) + " at column " +
-         std::to_string(strange - line.begin() + 1) + " is not printable ASCII");
-  return trimmed(line);
-}
 
 KvnLine KvnLines::classify(std::string_view line) const {
   const std::size_t equals = line.find('=');
   const std::string_view keyword = trimmed(line.substr(0, equals));
   const std::string_view value =
       equals == std::string_view::npos ? std::string_view() : trimmed(line.substr(equals + 1));
-  if (equals == std::string_view::npos && !is_keyword(keyword)) return {number_, {}, line};
+  if (equals == std::string_view::npos && !is_keyword(keyword)) return {lines_.number(), {}, line};
   if (!is_keyword(keyword))
     fail(quoted(keyword) + " is not a keyword; accepted: capitals, digits and underscores");
   if (stands_alone(keyword) && equals != std::string_view::npos)
     fail(std::string(keyword) + " takes no value");
   if (!stands_alone(keyword) && value.empty()) fail(std::string(keyword) + " has no value");
-  return {number_, keyword, value};
+  return {lines_.number(), keyword, value};
 }
 
 void KvnLines::look_ahead() {
-  while (const std::optional<std::string_view> line = next_raw_line()) {
-    if (line->empty()) continue;
-    if (line->starts_with('<')) fail("this is XML; only key-value notation (KVN) is read");
-    if (is_comment(*line)) {
-      comments_.emplace_back(trimmed(line->substr(kComment.size())));
+  while (const std::optional<std::string_view> raw = lines_.next()) {
+    const std::string_view line = trimmed(*raw);
+    if (line.empty()) continue;
+    if (line.starts_with('<')) fail("this is XML; only key-value notation (KVN) is read");
+    if (is_comment(line)) {
+      comments_.emplace_back(trimmed(line.substr(kComment.size())));
       continue;
     }
-    next_ = classify(*line);
+    next_ = classify(line);
     return;
   }
 }
@@ -148,10 +95,8 @@ KvnLine KvnLines::take(std::string_view keyword, std::vector<std::string>& comme
 }
 
 double KvnLines::number(int line, std::string_view word, std::string_view name) const {
-  const std::optional<double> value = whole_number_in<double>(word);
-  // from_chars also reads "nan" and "inf".
-  if (!value || !std::isfinite(*value))
-    fail(line, std::string(name) + ": " + quoted(word) + " is not a finite number");
+  const std::optional<double> value = text::finite_number(word);
+  if (!value) fail(line, std::string(name) + ": " + quoted(word) + " is not a finite number");
   return *value;
 }
 
@@ -180,7 +125,7 @@ double KvnLines::not_negative(const KvnLine& line, std::string_view unit) const 
 }
 
 int KvnLines::integer(const KvnLine& line, int low, int high) const {
-  const std::optional<int> value = whole_number_in<int>(line.value);
+  const std::optional<int> value = text::whole_number(line.value);
   if (!value || *value < low || *value > high)
     fail(line.number, std::string(line.keyword) + " is " + quoted(line.value) +
                           "; accepted: " + std::to_string(low) + " to " + std::to_string(high));
@@ -212,7 +157,7 @@ void KvnWriter::line(std::string_view text) {
 
 void KvnWriter::comments(const std::vector<std::string>& comments) {
   for (const std::string& comment : comments) {
-    if (!std::all_of(comment.begin(), comment.end(), is_text) || trimmed(comment) != comment)
+    if (!text::is_text(comment) || trimmed(comment) != comment)
       throw std::invalid_argument(writer_ + ": COMMENT " + quoted(comment) +
                                   "; accepted: printable ASCII without blanks at its ends");
     line(comment.empty() ? std::string(kComment) : std::string(kComment) + " " + comment);
@@ -220,7 +165,7 @@ void KvnWriter::comments(const std::vector<std::string>& comments) {
 }
 
 void KvnWriter::text(std::string_view keyword, std::string_view value) {
-  if (value.empty() || !std::all_of(value.begin(), value.end(), is_text) || trimmed(value) != value)
+  if (value.empty() || !text::is_text(value) || trimmed(value) != value)
     throw std::invalid_argument(
         writer_ + ": " + std::string(keyword) + " is " + quoted(value) +
         "; accepted: printable ASCII, not empty, without blanks at its ends");

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <orrery/models/ccsds/epoch.hpp>
+#include <orrery/models/text/numbered_lines.hpp>
 
 #include <optional>
 #include <string>
@@ -22,7 +23,8 @@ struct KvnLine {
 class KvnLines {
  public:
   /// `reader` opens every message: "parse_oem".
-  KvnLines(std::string_view text, std::string_view reader, std::string_view source);
+  KvnLines(std::string_view text, std::string_view reader, std::string_view source)
+      : lines_(text, reader, source) {}
 
   /// The next line that is no comment, without taking it; null after the last.
   const KvnLine* peek();
@@ -36,8 +38,8 @@ class KvnLines {
 
   /// @throws std::invalid_argument  "reader: source, line N: what", always. Without a number: the
   ///                                line last looked at.
-  [[noreturn]] void fail(int line, const std::string& what) const;
-  [[noreturn]] void fail(const std::string& what) const { fail(number_, what); }
+  [[noreturn]] void fail(int line, const std::string& what) const { lines_.fail(line, what); }
+  [[noreturn]] void fail(const std::string& what) const { lines_.fail(what); }
 
   // Values. `unit` is what may follow in brackets: "km"; empty: nothing may.
   double real(const KvnLine& line, std::string_view unit) const;
@@ -49,20 +51,16 @@ class KvnLines {
   std::string text(const KvnLine& line) const;
 
  private:
-  std::optional<std::string_view> next_raw_line();
   void look_ahead();
   KvnLine classify(std::string_view line) const;
 
-  std::string_view text_;
-  std::string prefix_;
-  int number_ = 0;
+  text::NumberedLines lines_;
   std::optional<KvnLine> next_;
   std::vector<std::string> comments_;
 };
 
-std::vector<std::string_view> words_of(std::string_view line);
-/// In quotes, cut to 40 characters, with what cannot be printed as '?'.
-std::string quoted(std::string_view text);
+using text::quoted;
+using text::words_of;
 
 /// Writes what KvnLines reads. @throws std::invalid_argument  text that would not be read back, a
 /// number that is not finite; names `writer` and the keyword.

@@ -1,8 +1,6 @@
 #include <orrery/models/ccsds/odm_io.hpp>
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 
 namespace orrery {
@@ -176,14 +174,6 @@ void KeywordsSeen::require(const KvnLines& lines, int line,
     if (!contains(seen_, keyword))
       lines.fail(line, "the metadata end without " + std::string(keyword));
   }
-}
-
-std::string read_file(const std::string& path, const char* reader) {
-  std::ifstream file(path, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file.is_open() || file.bad())
-    throw std::invalid_argument(std::string(reader) + ": cannot read '" + path + "'");
-  return text;
 }
 
 void require_geocentric_eme2000(const OdmMetadata& metadata, const char* function) {

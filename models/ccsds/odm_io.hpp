@@ -37,9 +37,6 @@ std::string canonical(std::string_view name);
 /// ITRF, ITRF2014, ITRF-97, as canonical() gives them.
 bool is_itrf(std::string_view canonical_name);
 
-/// @throws std::invalid_argument  it cannot be read.
-std::string read_file(const std::string& path, const char* reader);
-
 /// Metres; the frame is for the caller to check. @throws std::invalid_argument  naming `function`,
 /// for a centre or frame other than the Earth and EME2000.
 void require_geocentric_eme2000(const OdmMetadata& metadata, const char* function);

@@ -216,7 +216,7 @@ Oem parse_oem(std::string_view text, std::string_view source_name) {
 }
 
 Oem load_oem(const std::string& path) {
-  return parse_oem(ccsds::read_file(path, "load_oem"), path);
+  return parse_oem(text::read_file(path, "load_oem"), path);
 }
 
 }  // namespace orrery

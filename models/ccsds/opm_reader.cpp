@@ -169,7 +169,7 @@ Opm parse_opm(std::string_view text, std::string_view source_name) {
 }
 
 Opm load_opm(const std::string& path) {
-  return parse_opm(ccsds::read_file(path, "load_opm"), path);
+  return parse_opm(text::read_file(path, "load_opm"), path);
 }
 
 OrbitState state_of(const Opm& opm) {

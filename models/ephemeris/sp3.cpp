@@ -1,7 +1,7 @@
 #include <orrery/harness/kernel/text.hpp>
 #include <orrery/models/ccsds/epoch.hpp>
 #include <orrery/models/ephemeris/sp3.hpp>
-#include <orrery/models/frames/eop_text.hpp>
+#include <orrery/models/text/numbered_lines.hpp>
 
 #include <algorithm>
 #include <chrono>
@@ -11,9 +11,9 @@
 namespace orrery {
 namespace {
 
-using eop::NumberedLines;
-using eop::quoted;
-using eop::trimmed;
+using text::NumberedLines;
+using text::quoted;
+using text::trimmed;
 
 constexpr std::int32_t kMjdOf1970 = 40587, kGpsEpochDay = 3657;
 constexpr std::size_t kSatellitesPerLine = 17, kIdLines = 5, kMostSatellites = 85;
@@ -297,7 +297,7 @@ Sp3 parse_sp3(std::string_view text, std::string_view source_name, Sp3Options op
 }
 
 Sp3 load_sp3(const std::string& path, Sp3Options options) {
-  return parse_sp3(eop::read_file(path, "load_sp3"), path, options);
+  return parse_sp3(text::read_file(path, "load_sp3"), path, options);
 }
 
 }  // namespace orrery

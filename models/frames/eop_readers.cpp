@@ -1,11 +1,17 @@
 #include <orrery/models/frames/eop_readers.hpp>
-#include <orrery/models/frames/eop_text.hpp>
+#include <orrery/models/text/numbered_lines.hpp>
 
 #include <erfa.h>
 
 #include <chrono>
 
 namespace orrery::eop {
+
+using text::NumberedLines;
+using text::quoted;
+using text::trimmed;
+using text::words_of;
+
 namespace {
 
 constexpr const char* kReader = "EarthOrientationTable";

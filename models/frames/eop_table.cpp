@@ -1,8 +1,8 @@
 #include <orrery/models/frames/eop_nutation_offsets.hpp>
 #include <orrery/models/frames/eop_readers.hpp>
 #include <orrery/models/frames/eop_table.hpp>
-#include <orrery/models/frames/eop_text.hpp>
 #include <orrery/models/frames/time_scales.hpp>
+#include <orrery/models/text/numbered_lines.hpp>
 
 #include <algorithm>
 #include <array>
@@ -82,7 +82,7 @@ void EarthOrientationTable::fill_length_of_day() {
 }
 
 EarthOrientationTable EarthOrientationTable::load(const std::string& path) {
-  return parse(eop::read_file(path, "EarthOrientationTable::load"), path);
+  return parse(text::read_file(path, "EarthOrientationTable::load"), path);
 }
 
 void EarthOrientationTable::require_rows(const char* function) const {

@@ -1,6 +1,6 @@
 #include <orrery/models/data/embedded_tables.hpp>
-#include <orrery/models/frames/eop_text.hpp>
 #include <orrery/models/gnss/almanac.hpp>
+#include <orrery/models/text/numbered_lines.hpp>
 
 #include <array>
 #include <cctype>
@@ -9,10 +9,10 @@
 namespace orrery {
 namespace {
 
-using eop::NumberedLines;
-using eop::quoted;
-using eop::trimmed;
-using eop::words_of;
+using text::NumberedLines;
+using text::quoted;
+using text::trimmed;
+using text::words_of;
 
 constexpr const char* kReader = "GpsAlmanac";
 constexpr double kPi = std::numbers::pi;
@@ -249,7 +249,7 @@ GpsAlmanac parse_sem(std::string_view text, std::string_view source_name) {
 }
 
 GpsAlmanac load_almanac(const std::string& path) {
-  const std::string text = eop::read_file(path, kReader);
+  const std::string text = text::read_file(path, kReader);
   return text.starts_with("***") ? parse_yuma(text, path) : parse_sem(text, path);
 }
 

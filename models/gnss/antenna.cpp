@@ -1,6 +1,6 @@
 #include <orrery/models/data/embedded_tables.hpp>
-#include <orrery/models/frames/eop_text.hpp>
 #include <orrery/models/gnss/antenna.hpp>
+#include <orrery/models/text/numbered_lines.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -29,7 +29,7 @@ AntennaPattern AntennaPattern::patch() {
 }
 
 AntennaPattern AntennaPattern::parse(std::string_view text, std::string_view source_name) {
-  eop::NumberedLines lines(text, "AntennaPattern", source_name);
+  text::NumberedLines lines(text, "AntennaPattern", source_name);
   const auto header = lines.next();
   if (!header || *header != "off_boresight_deg,gain_dbi") {
     lines.fail("the first line is not off_boresight_deg,gain_dbi");
@@ -38,7 +38,7 @@ AntennaPattern AntennaPattern::parse(std::string_view text, std::string_view sou
   while (const auto line = lines.next()) {
     const std::size_t comma = line->find(',');
     if (comma == std::string_view::npos || !lines.line_had_end()) {
-      lines.fail(eop::quoted(*line) + " is not a whole line of two fields");
+      lines.fail(text::quoted(*line) + " is not a whole line of two fields");
     }
     const double angle_rad = lines.real(line->substr(0, comma), "angle", 180) * kDegree;
     const double gain_dBi = lines.real(line->substr(comma + 1), "gain", 100);

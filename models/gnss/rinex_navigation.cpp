@@ -1,6 +1,6 @@
-#include <orrery/models/frames/eop_text.hpp>
 #include <orrery/models/gnss/gps_constants.hpp>
 #include <orrery/models/gnss/rinex_navigation.hpp>
+#include <orrery/models/text/numbered_lines.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -9,9 +9,9 @@
 namespace orrery {
 namespace {
 
-using eop::NumberedLines;
-using eop::quoted;
-using eop::trimmed;
+using text::NumberedLines;
+using text::quoted;
+using text::trimmed;
 
 constexpr const char* kReader = "RinexNavigation";
 constexpr std::size_t kNumberWidth = 19;
@@ -242,7 +242,7 @@ RinexNavigation RinexNavigation::parse(std::string_view text, std::string_view s
 }
 
 RinexNavigation RinexNavigation::load(const std::string& path) {
-  return parse(eop::read_file(path, kReader), path);
+  return parse(text::read_file(path, kReader), path);
 }
 
 }  // namespace orrery

@@ -1,17 +1,18 @@
 #include <orrery/models/data/embedded_tables.hpp>
 #include <orrery/models/orbit/gravity_field.hpp>
+#include <orrery/models/text/numbered_lines.hpp>
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 
 namespace orrery {
 namespace {
+
+using text::quoted;
+using text::whole_number;
 
 constexpr int kHighestDegree = 360;  // scale factors of HarmonicGravity stay far inside double
 constexpr std::string_view kBlanks = " \t\r";
@@ -31,16 +32,7 @@ std::string_view take_word(std::string_view& line) {
   return word;
 }
 
-template <class Number>
-std::optional<Number> number_in(std::string_view word) {
-  Number value{};
-  if (!word.empty() && word.front() == '+') word.remove_prefix(1);
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error != std::errc{} || end != word.data() + word.size()) return {};
-  return value;
-}
-
-// Fortran writes 1.0D-10. from_chars also reads "nan" and "inf", which no coefficient may be.
+// Fortran writes 1.0D-10.
 std::optional<double> real_in(std::string_view word) {
   const std::size_t exponent = word.find_first_of("Dd");
   std::string c_style;
@@ -49,16 +41,7 @@ std::optional<double> real_in(std::string_view word) {
     c_style[exponent] = 'E';
     word = c_style;
   }
-  const std::optional<double> value = number_in<double>(word);
-  return value && std::isfinite(*value) ? value : std::nullopt;
-}
-
-// A word for a message, which need not be readable or short in a damaged file.
-std::string quoted(std::string_view word) {
-  constexpr std::size_t kLongest = 40;
-  std::string text = "'";
-  for (const char c : word.substr(0, kLongest)) text += c >= ' ' && c <= '~' ? c : '?';
-  return text + (word.size() > kLongest ? "...'" : "'");
+  return text::finite_number(word);
 }
 
 std::string in_short(double value) {
@@ -123,7 +106,7 @@ class GravityFieldReader {
     if (keyword == "earth_gravity_constant" || keyword == "gravity_constant")
       field_.mu_m3ps2_ = positive(keyword, value, kLargestMu_m3ps2);
     if (keyword == "radius") field_.radius_m_ = positive(keyword, value, kLargestRadius_m);
-    if (keyword == "max_degree") announced_degree_ = number_in<int>(value).value_or(-1);
+    if (keyword == "max_degree") announced_degree_ = whole_number(value).value_or(-1);
     if (keyword == "norm" && value != "fully_normalized")
       fail("norm is " + quoted(value) + "; accepted: fully_normalized");
   }
@@ -163,8 +146,8 @@ class GravityFieldReader {
   }
 
   void read_coefficient(std::string_view line) {
-    const std::optional<int> n = number_in<int>(take_word(line));
-    const std::optional<int> m = number_in<int>(take_word(line));
+    const std::optional<int> n = whole_number(take_word(line));
+    const std::optional<int> m = whole_number(take_word(line));
     const std::optional<double> C = real_in(take_word(line));
     const std::optional<double> S = real_in(take_word(line));
     if (!n || !m || !C || !S) fail("malformed; accepted: gfc n m C S with four finite numbers");
@@ -235,11 +218,7 @@ GravityField GravityField::ggm05s() {
 }
 
 GravityField GravityField::load(const std::string& path, std::optional<int> degree) {
-  std::ifstream file(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file.is_open() || file.bad())
-    throw std::invalid_argument("GravityField::load: cannot read '" + path + "'");
-  return parse(text, path, degree);
+  return parse(text::read_file(path, "GravityField::load"), path, degree);
 }
 
 GravityField GravityField::parse(std::string_view text, std::string_view source_name,

@@ -235,8 +235,9 @@ TEST(SpaceWeatherTest, MalformedCelestrakFilesAreRefusedWithTheirLine) {
   const struct {
     std::string text, message;
   } cases[] = {
-      {std::string("\0\x7f\xff\x01ELF", 7), "line 1: cut short"},
-      {std::string("\0\x7f\xff\x01\n\n", 6), "line 1: not a CelesTrak space-weather file"},
+      {std::string("\x7f\x45LF", 4), "line 1: byte 0x7f at column 1 is not printable ASCII"},
+      {"DATATYPE CssiSpaceWeather", "line 1: cut short: the last line has no line end"},
+      {"DATATYPE Others\n", "line 1: not a CelesTrak space-weather file"},
       {replaced(good, "POINTS 5", "POINTS 4"), "END OBSERVED is missing: more lines than the 4"},
       {replaced(good, "POINTS 5", "POINTS 6"), "line 13: OBSERVED ends after 5 of 6"},
       {replaced(good, "POINTS 5", "POINTS 99999999999999999999"), "NUM_OBSERVED_POINTS is '9999"},

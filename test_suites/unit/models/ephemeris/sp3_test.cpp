@@ -161,7 +161,7 @@ INSTANTIATE_TEST_SUITE_P(
                  std::string("-18\0"
                              "7",
                              5),
-                 "is not text"),
+                 "is not printable ASCII"),
         Defect{"CutInARecord", until("-5070.49"), line_of(kText, "-5070.49"), "cut short"},
         Defect{"NoEof", until("EOF"), line_of(kText, "EOF") - 1, "cut short"},
         Defect{"NoLineEnd", kText.substr(0, kText.size() - 1), line_of(kText, "EOF"), "cut short"},
