@@ -4,8 +4,12 @@
 #include <cerrno>
 #include <cstdio>
 #include <fcntl.h>
+#include <optional>
 #include <stdexcept>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <system_error>
+#include <unistd.h>
 
 namespace orrery {
 
@@ -53,6 +57,34 @@ void remove_tree(const fs::path& folder) {
   if (error) fail("removed", folder, error);
 }
 
+void clear_folder(const fs::path& folder) {
+  std::error_code error;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
+    fs::remove_all(at->path(), error);
+  if (error) fail("cleared", folder, error);
+}
+
+bool is_still_at(int folder, const fs::path& path) {
+  struct stat held {
+  }, named{};
+  return fstat(folder, &held) == 0 && stat(path.c_str(), &named) == 0 &&
+         held.st_dev == named.st_dev && held.st_ino == named.st_ino;
+}
+
+// Creates the folder, or takes over one that a killed run left. Nothing: a living run has it.
+std::optional<int> claimed(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directory(folder, error);
+  if (error && error != std::errc::file_exists) fail("created", folder, error);
+  const int handle = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (handle < 0 && errno == ENOENT) return {};  // that run has just put it in place
+  if (handle < 0) fail("opened", folder, std::error_code(errno, std::generic_category()));
+  // The lock goes with the process, however it ends.
+  if (flock(handle, LOCK_EX | LOCK_NB) == 0 && is_still_at(handle, folder)) return handle;
+  ::close(handle);
+  return {};
+}
+
 // Swaps two folders in one step. False: this file system cannot.
 bool exchange(const fs::path& a, const fs::path& b) {
   if (renameat2(AT_FDCWD, a.c_str(), AT_FDCWD, b.c_str(), RENAME_EXCHANGE) == 0) return true;
@@ -67,15 +99,20 @@ OutputFolder::OutputFolder(const fs::path& root, std::string_view test, std::uin
   const fs::path parent = root / folder_name(test);
   const std::string run = run_name(seed, repetition);
   path_ = parent / run;
-  partial_ = parent / ("." + run + ".partial");
-  remove_tree(partial_);
-  create_tree(partial_);
+  create_tree(parent);
+  std::optional<int> lock;
+  for (int k = 1; !lock; ++k) {
+    partial_ = parent / ("." + run + ".partial" + (k > 1 ? std::to_string(k) : ""));
+    lock = claimed(partial_);
+  }
+  lock_ = *lock;
+  clear_folder(partial_);
 }
 
 OutputFolder::~OutputFolder() {
-  if (closed_) return;
   std::error_code ignored;
-  fs::remove_all(partial_, ignored);
+  if (!closed_) fs::remove_all(partial_, ignored);
+  if (lock_ >= 0) ::close(lock_);
 }
 
 fs::path OutputFolder::file(const fs::path& relative) const {
@@ -91,20 +128,35 @@ fs::path OutputFolder::file(const fs::path& relative) const {
 
 void OutputFolder::close() {
   if (closed_) return;
-  std::error_code error;
-  if (fs::exists(path_)) {
-    // After the exchange the earlier run is in partial_. Without it there is an instant at which
-    // no folder of this name exists, but never a mixture.
-    if (!exchange(partial_, path_)) {
-      remove_tree(path_);
-      fs::rename(partial_, path_, error);
-    }
-  } else {
-    fs::rename(partial_, path_, error);
+  while (!try_to_put_in_place()) {
   }
-  if (error) fail("put in place", path_, error);
   closed_ = true;
-  remove_tree(partial_);
+  ::close(lock_);
+  lock_ = -1;
+}
+
+// False: another run of this name was put in place meanwhile.
+bool OutputFolder::try_to_put_in_place() {
+  std::error_code error;
+  fs::rename(partial_, path_, error);
+  if (!error) return true;
+  if (error != std::errc::directory_not_empty && error != std::errc::file_exists)
+    fail("put in place", path_, error);
+  // The earlier run is locked until it is gone, so that nobody claims it under its hidden name.
+  const int earlier = open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (earlier < 0 && errno == ENOENT) return false;
+  if (earlier < 0) fail("replaced", path_, std::error_code(errno, std::generic_category()));
+  const bool mine = flock(earlier, LOCK_EX) == 0 && is_still_at(earlier, path_);
+  if (mine) replace_earlier();
+  ::close(earlier);
+  return mine;
+}
+
+void OutputFolder::replace_earlier() {
+  if (exchange(partial_, path_)) return remove_tree(partial_);
+  // There is an instant at which no folder of this name exists, but never a mixture.
+  remove_tree(path_);
+  fs::rename(partial_, path_);
 }
 
 }  // namespace orrery

@@ -14,7 +14,8 @@ namespace orrery {
 ///
 /// Files are written to a hidden folder beside it, which close() puts in its place: a reader sees
 /// the earlier run's folder or this one's, never a mixture. What a killed run left is removed by
-/// the next run of the same name.
+/// the next run of the same name. Two at once (their programs started side by side) write apart,
+/// and the one that closes last stays.
 class OutputFolder {
  public:
   /// Creates the folders. `test`: "Suite.Test"; '/' in it becomes '-'.
@@ -40,7 +41,11 @@ class OutputFolder {
   void close();
 
  private:
+  bool try_to_put_in_place();
+  void replace_earlier();
+
   std::filesystem::path path_, partial_;
+  int lock_ = -1;  // of partial_, while this object lives
   bool closed_ = false;
 };
 

@@ -4,6 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <set>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <vector>
 
 #include "scratch_folder.hpp"
 
@@ -73,6 +76,52 @@ TEST_F(OutputFolderTest, RemainsOfAKilledRunAreNotMixedIn) {
   write(folder.file("a.csv"), "");
   folder.close();
   EXPECT_THAT(tree(root / "A.B"), testing::ElementsAre("seed-1", "seed-1/a.csv"));
+}
+
+TEST_F(OutputFolderTest, RunsSideBySideDoNotMixAndTheLastOneStays) {
+  OutputFolder first(root.path(), "A.B", 1), second(root.path(), "A.B", 1);
+  write(first.file("first.csv"), "");
+  write(second.file("second.csv"), "");
+  second.close();
+  EXPECT_THAT(tree(root / "A.B/seed-1"), testing::ElementsAre("second.csv"));
+  OutputFolder third(root.path(), "A.B", 1);
+  write(third.file("third.csv"), "");
+  first.close();
+  EXPECT_THAT(tree(root / "A.B/seed-1"), testing::ElementsAre("first.csv"));
+  third.close();
+  EXPECT_THAT(tree(root / "A.B"), testing::ElementsAre("seed-1", "seed-1/third.csv"));
+}
+
+// What a child of the test below does; its exit code. Nothing may leave it: it is a copy of the
+// whole test program.
+int run_many_times(const fs::path& root, int program) noexcept {
+  for (int run = 0; run < 25; ++run) {
+    OutputFolder folder(root, "A.B", 1);
+    for (const char* name : {"a.csv", "b.csv", "c.csv"})
+      write(folder.file(name), std::to_string(1000 * program + run));
+    folder.close();
+  }
+  return 0;
+}
+
+TEST_F(OutputFolderTest, ProgramsSideBySideLeaveOneWholeRun) {
+  std::vector<pid_t> children;
+  for (int program = 0; program < 4; ++program) {
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) _exit(run_many_times(root.path(), program));
+    children.push_back(child);
+  }
+  for (const pid_t child : children) {
+    int status = -1;
+    waitpid(child, &status, 0);
+    EXPECT_EQ(status, 0);
+  }
+  EXPECT_THAT(tree(root / "A.B"),
+              testing::ElementsAre("seed-1", "seed-1/a.csv", "seed-1/b.csv", "seed-1/c.csv"));
+  const std::string content = content_of(root / "A.B/seed-1/a.csv");
+  EXPECT_EQ(content_of(root / "A.B/seed-1/b.csv"), content);
+  EXPECT_EQ(content_of(root / "A.B/seed-1/c.csv"), content);
 }
 
 TEST_F(OutputFolderTest, SlashesOfParameterisedTestsBecomeDashes) {
