@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -51,6 +52,10 @@ class RandomStream {
   /// True with this probability, 0 to 1. Always one draw, for 0 (never) and 1 (always) as well.
   bool bernoulli(double probability);
 
+  /// The next whole block of Philox, which counts as two draws; where one draw is left of the last
+  /// block, that one is passed over and counted as well.
+  std::array<std::uint64_t, 2> block();
+
   /// 64-bit draws so far.
   std::uint64_t draws() const { return draws_; }
 
@@ -59,6 +64,16 @@ class RandomStream {
   std::uint64_t draws_ = 0;
   std::uint64_t second_ = 0;  // a block of Philox gives two draws
 };
+
+/// Three standard normals from one block() of each stream; a stream that occurs twice gives its
+/// next block the second time. What one stream gives does not depend on the others.
+///
+/// Method   normal_quantile of (k + 1/2) 2^-42 with 42 bits k of the block each: within +-7.1. For
+/// a
+///          dozen streams two to three times as fast as so many normal(), whose latencies do not
+///          overlap.
+/// @param out  As many as there are streams.
+void normal_triples(std::span<RandomStream* const> streams, std::span<std::array<double, 3>> out);
 
 /// All streams of a run.
 class RandomStreams {

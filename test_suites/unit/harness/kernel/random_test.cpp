@@ -93,6 +93,43 @@ TEST(RandomStreamTest, EveryDistributionTakesOneDraw) {
   EXPECT_EQ(stream.draws(), 9u);
 }
 
+// The words of a block are whole ones, whatever was drawn before: an odd draw is passed over.
+TEST(RandomStreamTest, BlocksStartAtEvenDraws) {
+  RandomStream drawn(9), whole(9);
+  const std::array<std::uint64_t, 2> first = whole.block(), second = whole.block();
+  EXPECT_EQ(drawn.bits(), first[0]);
+  EXPECT_EQ(drawn.block(), second);
+  EXPECT_EQ(drawn.draws(), 4u);
+  EXPECT_EQ(drawn.bits(), whole.bits());
+  EXPECT_EQ(drawn.bits(), whole.bits());
+}
+
+/// (k + 1/2) / 2^42 of the three times 42 bits of a block, by integers of 128 bits.
+std::array<double, 3> triple_by_hand(const std::array<std::uint64_t, 2>& block) {
+  const std::uint64_t rest = block[0] % (1u << 22) * (1u << 20) + block[1] % (1u << 20);
+  std::array<double, 3> out{};
+  const std::uint64_t k[] = {block[0] / (1u << 22), block[1] / (1u << 22), rest};
+  for (std::size_t i = 0; i < 3; ++i) {
+    out[i] = normal_quantile(static_cast<double>(2 * k[i] + 1) * 0x1p-43);
+  }
+  return out;
+}
+
+// Equal to the bit, for more streams than are worked on together; streams that occur twice.
+TEST(NormalTriplesTest, AreTheQuantilesOfEachStreamsBlock) {
+  std::vector<RandomStream> streams, same;
+  std::vector<RandomStream*> order;
+  for (std::uint64_t key = 0; key < 37; ++key) streams.emplace_back(key), same.emplace_back(key);
+  for (RandomStream& stream : streams) order.push_back(&stream);
+  order.push_back(&streams[5]);
+  std::vector<std::array<double, 3>> out(order.size());
+  normal_triples(order, out);
+  for (std::size_t i = 0; i < 37; ++i) EXPECT_EQ(out[i], triple_by_hand(same[i].block())) << i;
+  EXPECT_EQ(out[37], triple_by_hand(same[5].block()));
+  EXPECT_EQ(streams[5].draws(), 4u);
+  EXPECT_EQ(streams[6].draws(), 2u);
+}
+
 // What keeps 0 and 1 out, which no sample would ever show.
 TEST(RandomStreamTest, UniformsAreOddMultiplesOfTwoToTheMinus53) {
   RandomStream stream(6);
@@ -227,6 +264,24 @@ TEST_P(RandomDistributionTest, EveryBitIsFair) {
 TEST_P(RandomDistributionTest, NormalIsNormal) {
   expect_distribution(sample([&] { return stream.normal(3.0, 2.0); }),
                       [](double x) { return normal_cdf((x - 3.0) / 2.0); });
+}
+
+TEST_P(RandomDistributionTest, NormalTriplesAreNormalAndIndependent) {
+  std::vector<double> xs[3];
+  double products[3] = {};
+  RandomStream* const streams[] = {&stream};
+  std::array<std::array<double, 3>, 1> z;
+  for (int i = 0; i < kDraws; ++i) {
+    normal_triples(streams, z);
+    for (std::size_t k = 0; k < 3; ++k) {
+      xs[k].push_back(z[0][k]);
+      products[k] += z[0][k] * z[0][(k + 1) % 3];
+    }
+  }
+  for (std::size_t k = 0; k < 3; ++k) {
+    expect_distribution(xs[k], normal_cdf);
+    EXPECT_LT(std::fabs(products[k]), 4.892 * std::sqrt(kDraws)) << k;
+  }
 }
 
 TEST_P(RandomDistributionTest, LogNormalHasTheLogarithmsItWasGiven) {
