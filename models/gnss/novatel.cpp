@@ -1,3 +1,4 @@
+#include <orrery/models/gnss/crc_fold.hpp>
 #include <orrery/models/gnss/novatel.hpp>
 #include <orrery/models/gnss/novatel_frame.hpp>
 
@@ -118,9 +119,24 @@ void put(const BestXyz& message, Writer w) {
   w.u8(message.gps_glonass_mask);
 }
 
+// By carry-less products where the processor has them (__builtin_cpu_supports asks the operating
+// system, too): as many bytes as that takes, and what they leave as a remainder of the next ones.
+std::uint32_t crc32_of_blocks(Bytes& bytes, std::uint32_t crc) {
+#if defined(ORRERY_CRC_CLMUL)
+  if (bytes.size() < kCrcFoldBytes || __builtin_cpu_supports("pclmul") == 0) return crc;
+  const CrcFold fold = crc_fold_clmul(bytes, crc);
+  bytes = bytes.subspan(fold.consumed);
+  return crc32(fold.remainder, 0);
+#else
+  (void)bytes;
+  return crc;
+#endif
+}
+
 }  // namespace
 
 std::uint32_t crc32(Bytes bytes, std::uint32_t crc) {
+  crc = crc32_of_blocks(bytes, crc);
   const std::byte* at = bytes.data();
   std::size_t left = bytes.size();
   for (; left >= kSlices; at += kSlices, left -= kSlices) crc = crc32_of_eight(at, crc);

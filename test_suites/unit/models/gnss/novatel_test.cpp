@@ -67,6 +67,14 @@ TEST(NovatelCrcTest, TableAgreesWithPolynomialDivisionAtEveryByte) {
 
 TEST(NovatelCrcTest, ContinuesWhereAnEarlierCallStopped) {
   EXPECT_EQ(crc32(bytes_of("6789"), crc32(bytes_of("12345"))), 0x2DFD2D88u);
+  // Long enough for both parts to go the way of whole blocks.
+  ByteBuffer bytes;
+  for (int i = 0; i < 700; ++i) bytes.push_back(static_cast<std::byte>((167 * i + i / 9) & 0xFF));
+  const std::uint32_t whole = crc32_by_division(bytes);
+  for (const std::size_t cut : {1u, 63u, 64u, 81u, 300u, 636u, 699u}) {
+    const Bytes all(bytes);
+    EXPECT_EQ(crc32(all.subspan(cut), crc32(all.first(cut))), whole) << cut;
+  }
 }
 
 // A frame written down from the layout tables of the manual: each group is one field. Values were
