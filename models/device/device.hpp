@@ -68,6 +68,9 @@ class DeviceContext {
   static constexpr int kDebug = 0, kInfo = 1, kWarning = 2, kError = 3;
   /// Value of a named fault parameter of this device; `nominal` while no fault is active.
   virtual double fault(std::string_view name, double nominal) const = 0;
+  /// False: no fault of this device was ever set, and fault() gives the nominal value of every
+  /// name.
+  virtual bool may_be_faulty() const { return true; }
 };
 
 /// Part of a spacecraft.

@@ -73,7 +73,7 @@ Cn0Model::Cn0Model(const AntennaPattern& pattern, Cn0Law law) : pattern_(pattern
   }
   for (int i = 0; i <= kTableIntervals + 1; ++i) {
     const double x = std::numbers::sqrt2 * i / kTableIntervals;
-    table_.push_back(at_angle(std::acos(std::max(1 - x * x, -1.0))));
+    table_.push_back(static_cast<float>(at_angle(std::acos(std::max(1 - x * x, -1.0)))));
   }
 }
 
@@ -86,16 +86,23 @@ double Cn0Model::at_cosine(double cos_off_boresight) const {
   constexpr double kPerStep = kTableIntervals / std::numbers::sqrt2;
   const double at = kPerStep * std::sqrt(std::max(1 - cos_off_boresight, 0.0));
   const int i = std::min(static_cast<int>(at), kTableIntervals);
-  const double low = table_[static_cast<std::size_t>(i)];
-  return low + (at - i) * (table_[static_cast<std::size_t>(i) + 1] - low);
+  const double low = static_cast<double>(table_[static_cast<std::size_t>(i)]);
+  const double high = static_cast<double>(table_[static_cast<std::size_t>(i) + 1]);
+  return low + (at - i) * (high - low);
+}
+
+TrackingNoise tracking_noise(double cn0_dBHz, double wavelength_m) {
+  const double root = root_of_noise(cn0_dBHz);
+  return {kChip_m * std::sqrt(kCodeLoop_Hz) * root,
+          wavelength_m / (2 * std::numbers::pi) * std::sqrt(kPhaseLoop_Hz) * root};
 }
 
 double phase_sigma_m(double cn0_dBHz, double wavelength_m) {
-  return wavelength_m / (2 * std::numbers::pi) * std::sqrt(kPhaseLoop_Hz) * root_of_noise(cn0_dBHz);
+  return tracking_noise(cn0_dBHz, wavelength_m).phase_sigma_m;
 }
 
 double code_sigma_m(double cn0_dBHz) {
-  return kChip_m * std::sqrt(kCodeLoop_Hz) * root_of_noise(cn0_dBHz);
+  return tracking_noise(cn0_dBHz, 0).code_sigma_m;
 }
 
 }  // namespace orrery

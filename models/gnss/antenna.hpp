@@ -54,7 +54,7 @@ class Cn0Model {
  private:
   AntennaPattern pattern_;
   double slope_ = 1;
-  std::vector<double> table_;
+  std::vector<float> table_;
 };
 
 /// Standard deviation of thermal tracking noise. Bounds of Table 2 of Bell and D'Amico: phase 0.659
@@ -65,5 +65,10 @@ class Cn0Model {
 ///         (C/N0)). Squaring loss is left out, as both bounds are met without it.
 double phase_sigma_m(double cn0_dBHz, double wavelength_m);
 double code_sigma_m(double cn0_dBHz);
+/// Both at once.
+struct TrackingNoise {
+  double code_sigma_m = 0, phase_sigma_m = 0;
+};
+TrackingNoise tracking_noise(double cn0_dBHz, double wavelength_m);
 
 }  // namespace orrery

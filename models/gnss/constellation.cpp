@@ -12,6 +12,7 @@ namespace orrery {
 namespace {
 
 constexpr Duration kKnots = 120s;
+constexpr double kKnots_s = 120;
 constexpr Duration kIssue = 2h;  // a week has a whole number of them
 constexpr double kGuard_m = 1e-4;
 constexpr double kTwoPi = 2 * std::numbers::pi;
@@ -255,7 +256,7 @@ const GpsSnapshot& GpsConstellation::at(SimTime t) {
   if (interpolate_) {
     const std::int64_t index = interval_index(t);
     if (index != interval_) make_interval(index);
-    const double s = to_seconds(t - from_ns(index * to_ns(kKnots))) / to_seconds(kKnots);
+    const double s = to_seconds(t - from_ns(index * to_ns(kKnots))) / kKnots_s;
     snapshot_.transmitting = interval_valid_;
     for (std::size_t i = 0; i < vehicles_.size(); ++i) {
       if ((interval_valid_ >> i & 1u) != 0) {
@@ -303,7 +304,7 @@ void GpsConstellation::make_interval(std::int64_t index) {
   fill_knots(index + 1, right_knots_, right_valid_);
   interval_ = index;
   interval_valid_ = left_valid & right_valid_;
-  const double h = to_seconds(kKnots);
+  const double h = kKnots_s;
   for (std::size_t i = 0; i < vehicles_.size(); ++i) {
     if ((interval_valid_ >> i & 1u) == 0) continue;
     const SatelliteState &a = left[i], &b = right_knots_[i];
@@ -341,13 +342,13 @@ void GpsConstellation::guard(int prn, std::int64_t index) const {
 }
 
 SatelliteState GpsConstellation::evaluate(const Polynomial& p, double s) {
-  const double h = to_seconds(kKnots);
+  constexpr double kPer = 1 / kKnots_s, kPer2 = kPer * kPer;
   double x[4], d[4], dd[4];
   for (int k = 0; k < 4; ++k) {
     const double c1 = p.c[1][k], c2 = p.c[2][k], c3 = p.c[3][k], c4 = p.c[4][k], c5 = p.c[5][k];
     x[k] = p.c[0][k] + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))));
-    d[k] = (c1 + s * (2 * c2 + s * (3 * c3 + s * (4 * c4 + s * (5 * c5))))) / h;
-    dd[k] = (2 * c2 + s * (6 * c3 + s * (12 * c4 + s * (20 * c5)))) / (h * h);
+    d[k] = (c1 + s * (2 * c2 + s * (3 * c3 + s * (4 * c4 + s * (5 * c5))))) * kPer;
+    dd[k] = (2 * c2 + s * (6 * c3 + s * (12 * c4 + s * (20 * c5)))) * kPer2;
   }
   return {{x[0], x[1], x[2]}, {d[0], d[1], d[2]}, {dd[0], dd[1], dd[2]}, x[3], d[3], dd[3]};
 }
@@ -358,8 +359,9 @@ const BroadcastEphemeris* GpsConstellation::broadcast(int prn, SimTime t) {
   Vehicle& v = vehicle(prn);
   if (v.from_almanac) {
     const std::int64_t issue = t.time_since_epoch() / kIssue;
-    const SimTime from(issue * kIssue);
-    if (v.current.prn == 0 || v.current_from != from) {
+    Issue& kept = v.kept[static_cast<std::size_t>(issue & 1)];
+    if (kept.number != issue) {
+      const SimTime from(issue * kIssue);
       BroadcastEphemeris e = carried_on(v.base, from + kIssue);
       e.iodc = static_cast<int>(issue % 1024);
       e.iode = e.iodc % 256;
@@ -367,10 +369,9 @@ const BroadcastEphemeris* GpsConstellation::broadcast(int prn, SimTime t) {
       for (const Window& w : healths_) {
         if (w.prn == prn && from >= w.from && from < w.until) e.health = w.health;
       }
-      v.current = lnav::quantised(e);
-      v.current_from = from;
+      kept = {issue, lnav::quantised(e)};
     }
-    return &v.current;
+    return &kept.data;
   }
   // As the satellites do it: the issue whose toe comes next, and the last one if there is none.
   const BroadcastEphemeris* last = nullptr;
@@ -395,7 +396,7 @@ void GpsConstellation::add_health(int prn, int health, SimTime from, SimTime unt
                                 "; accepted: 0 to 63");
   }
   healths_.push_back({prn, health, from, until});
-  vehicle(prn).current.prn = 0;
+  vehicle(prn).kept = {};
 }
 
 GpsAlmanac GpsConstellation::almanac(SimTime t) const {

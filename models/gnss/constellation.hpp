@@ -70,7 +70,7 @@ class GpsConstellation {
   std::optional<SatelliteState> exact(int prn, SimTime t) const;
 
   /// What the satellite broadcasts at `t` (quantised as the message is); null if it transmits
-  /// nothing. Valid until the next call for that satellite.
+  /// nothing. Valid until the call after next for that satellite.
   const BroadcastEphemeris* broadcast(int prn, SimTime t);
 
   /// TGD: the codes of L1 leave later by this than the clock says, those of L2 by (f1/f2)^2 of it.
@@ -89,14 +89,18 @@ class GpsConstellation {
   GpsAlmanac almanac(SimTime t) const;
 
  private:
+  /// One that broadcast() made of an almanac.
+  struct Issue {
+    std::int64_t number = INT64_MIN;
+    BroadcastEphemeris data;
+  };
   struct Vehicle {
     bool from_almanac = false;
     int health = 0;
     BroadcastEphemeris base;                 // of an almanac: the truth, toe near the epoch
     std::vector<BroadcastEphemeris> issues;  // of a file, by toe
     Vec3 perturbation_RTN;
-    BroadcastEphemeris current;  // the last that broadcast() made from an almanac
-    SimTime current_from;
+    std::array<Issue, 2> kept;  // even and odd ones: at a change receivers look at both
   };
   struct Window {
     int prn;

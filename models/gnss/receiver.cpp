@@ -64,15 +64,6 @@ Duration until_next_epoch(SimTime now, Duration period) {
   return since_epoch == 0ns ? 0ns : period - since_epoch;
 }
 
-// One draw per statement: the order of arguments is the compiler's.
-Vec3 white_noise(RandomStream& stream, double sigma) {
-  Vec3 noise;
-  noise.x = stream.normal(0, sigma);
-  noise.y = stream.normal(0, sigma);
-  noise.z = stream.normal(0, sigma);
-  return noise;
-}
-
 std::string label(int prn) {
   return (prn < 10 ? "G0" : "G") + std::to_string(prn);
 }
@@ -122,6 +113,15 @@ std::size_t GnssReceiver::add_sector(const SkySector& s) {
   sectors_.push_back(s);
   sector_faults_.push_back("sector " + std::to_string(sectors_.size() - 1));
   return sectors_.size() - 1;
+}
+
+std::size_t GnssReceiver::add_bias(const Vec3& by_ECEF) {
+  if (!is_finite(by_ECEF)) {
+    throw std::invalid_argument("GnssReceiver: bias of the solution is not finite");
+  }
+  biases_ECEF_.push_back(by_ECEF);
+  bias_faults_.push_back("bias " + std::to_string(biases_ECEF_.size() - 1));
+  return biases_ECEF_.size() - 1;
 }
 
 void GnssReceiver::start(DeviceContext& io) {
@@ -223,6 +223,7 @@ AntennaPlace GnssReceiver::antenna_place(DeviceContext& io, const Surroundings& 
 GnssTracker::Faults GnssReceiver::tracking_faults(DeviceContext& io, const AntennaPlace& antenna,
                                                   const GpsSnapshot& gps) const {
   GnssTracker::Faults faults;
+  if (!io.may_be_faulty()) return faults;  // spares a hundred questions an epoch
   for (int prn = 1; prn <= gps::kSatellites; ++prn) {
     const std::uint32_t bit = 1u << (prn - 1);
     if ((gps.transmitting & bit) == 0) continue;
@@ -286,8 +287,11 @@ std::uint32_t GnssReceiver::ephemerides_known() const {
 }
 
 void GnssReceiver::solve(DeviceContext& io, const AntennaPlace& antenna) {
-  const Vec3 noise_r = white_noise(*position_noise_, options_.sigma_position_m);
-  const Vec3 noise_v = white_noise(*velocity_noise_, options_.sigma_velocity_mps);
+  RandomStream* const streams[] = {position_noise_, velocity_noise_};
+  std::array<std::array<double, 3>, 2> z;
+  normal_triples(streams, z);
+  const Vec3 noise_r = options_.sigma_position_m * Vec3{z[0][0], z[0][1], z[0][2]};
+  const Vec3 noise_v = options_.sigma_velocity_mps * Vec3{z[1][0], z[1][1], z[1][2]};
   int usable = 0;
   for (const GnssChannel& channel : tracker_->channels()) {
     const Ephemeris& e = ephemerides_[static_cast<std::size_t>(channel.prn - 1)];
@@ -297,9 +301,10 @@ void GnssReceiver::solve(DeviceContext& io, const AntennaPlace& antenna) {
   solution_.satellites = usable;
   solution_.computed = usable >= kFewestSatellites;
   if (!solution_.computed) return;
-  const Vec3 bias_ECEF{io.fault("bias_x_m", 0.0), io.fault("bias_y_m", 0.0),
-                       io.fault("bias_z_m", 0.0)};
-  solution_.r_ECEF = antenna.r_ECEF + noise_r + bias_ECEF;
+  solution_.r_ECEF = antenna.r_ECEF + noise_r;
+  for (std::size_t k = 0; k < biases_ECEF_.size(); ++k) {
+    if (io.fault(bias_faults_[k], 0.0) != 0.0) solution_.r_ECEF += biases_ECEF_[k];
+  }
   solution_.v_ECEF = antenna.v_ECEF + noise_v;
   if (!time_known_) {
     time_known_ = true;

@@ -55,8 +55,8 @@ struct SkySector {
 ///               "sector k": nothing from the k-th sector (add_sector). "slip G07": that many
 ///               cycles (halves allowed) are added to the phase at each epoch at which it is not 0.
 ///               "restart": 1 warm, 2 cold. "clock_jump_s": added to the bias at each epoch.
-///               "freeze": the solution repeats itself. "bias_x_m", "bias_y_m", "bias_z_m": of the
-///               solution in ECEF. "week_offset": weeks added to every week in the headers.
+///               "freeze": the solution repeats itself. "bias k": the solution is off by the k-th
+///               vector (add_bias). "week_offset": weeks added to every week in the headers.
 ///               "withhold", "withhold G07": no ephemeris is received. Of each message: "corrupt":
 ///               that many bits are turned over, "cut": that many bytes are missing at its end.
 class GnssReceiver final : public Device {
@@ -74,6 +74,9 @@ class GnssReceiver final : public Device {
 
   /// The number k for the fault "sector k". @throws std::invalid_argument  an empty sector.
   std::size_t add_sector(const SkySector& sector);
+  /// The number k for the fault "bias k", of the solution in ECEF [m]: one fault, so that all axes
+  /// have it or none, however often it is drawn. @throws std::invalid_argument  not finite.
+  std::size_t add_bias(const Vec3& by_ECEF);
   /// The list of logs, to be changed between epochs as LOG and UNLOG would.
   novatel::LogSchedule& logs() { return logs_; }
   Duration period() const { return options_.period; }
@@ -127,6 +130,8 @@ class GnssReceiver final : public Device {
   std::optional<novatel::LogCommandReader> commands_;  // of this power-on
   std::vector<SkySector> sectors_;
   std::vector<std::string> sector_faults_;
+  std::vector<Vec3> biases_ECEF_;
+  std::vector<std::string> bias_faults_;
   std::array<FaultNames, gps::kSatellites> fault_names_;
   std::array<Ephemeris, gps::kSatellites> ephemerides_;
   RandomStream *position_noise_ = nullptr, *velocity_noise_ = nullptr, *clock_noise_ = nullptr;

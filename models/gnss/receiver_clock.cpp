@@ -1,6 +1,7 @@
 #include <orrery/harness/kernel/text.hpp>
 #include <orrery/models/gnss/receiver_clock.hpp>
 
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
@@ -33,12 +34,13 @@ ReceiverClock::ReceiverClock(const ReceiverClockOptions& options)
 void ReceiverClock::advance(double dt_s, RandomStream& noise) {
   const double q_drift = 2 * kPi * kPi * options_.h_2_ps * dt_s;
   const double q_bias = 0.5 * options_.h0_s * dt_s + q_drift * dt_s * dt_s / 3;
-  const double w_bias = std::sqrt(q_bias) * noise.normal();
-  const double w_drift = std::sqrt(q_drift) * noise.normal();
-  bias_s_ += drift_sps_ * dt_s + w_bias;
-  drift_sps_ += w_drift;
-  const double bias_seen = bias_s_ + options_.sigma_bias_s * noise.normal();
-  const double drift_error = options_.sigma_drift_sps * noise.normal();
+  RandomStream* const streams[] = {&noise, &noise};
+  std::array<std::array<double, 3>, 2> z;
+  normal_triples(streams, z);
+  bias_s_ += drift_sps_ * dt_s + std::sqrt(q_bias) * z[0][0];
+  drift_sps_ += std::sqrt(q_drift) * z[0][1];
+  const double bias_seen = bias_s_ + options_.sigma_bias_s * z[1][0];
+  const double drift_error = options_.sigma_drift_sps * z[1][1];
   if (options_.steered) {
     if (dt_s > 0) {
       const double wanted = std::expm1(-dt_s / options_.steering_time_s) / dt_s * bias_seen;

@@ -29,7 +29,7 @@ class ReceiverClock {
   explicit ReceiverClock(const ReceiverClockOptions& options);
 
   /// To the next epoch, `dt_s` later: free motion since the last, then the correction for the next
-  /// interval. Four draws.
+  /// interval. Two normal_triples().
   void advance(double dt_s, RandomStream& noise);
   /// A jump of the bias [s]; beyond 1 ms the whole milliseconds are taken out again.
   void jump(double by_s);

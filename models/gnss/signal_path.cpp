@@ -48,9 +48,11 @@ Sight SightCheck::operator()(const AntennaPlace& antenna, double radius_m,
                              const Vec3& satellite_ECEF) const {
   Sight s;
   const Vec3 d = satellite_ECEF - antenna.r_ECEF;
+  const double along_boresight_m = dot(antenna.R_AE.row_z, d);
+  if (along_boresight_m < 0 && cos_mask_ >= 0) return s;  // half the sky without a root
   s.distance_m = norm(d);
-  s.u_ECEF = d / s.distance_m;
-  s.cos_off_boresight = dot(antenna.R_AE.row_z, s.u_ECEF);
+  s.u_ECEF = (1 / s.distance_m) * d;
+  s.cos_off_boresight = along_boresight_m / s.distance_m;
   if (s.cos_off_boresight < cos_mask_) return s;
   const double along_r = dot(antenna.r_ECEF, s.u_ECEF);
   s.sin_elevation = along_r / radius_m;
@@ -80,13 +82,14 @@ ReceivedSignal receive(const SatelliteState& satellite, const AntennaPlace& ante
   const Vec3 d = r_s - r;
   ReceivedSignal out;
   const double range_m = norm(d);
-  const Vec3 u = d / range_m;
+  const Vec3 u = (1 / range_m) * d;
   const Vec3 v_s =
       earth_turned(satellite.v_ECEF + dt_s * satellite.a_ECEF, kOmegaEarth_radps * tau_s);
   const Vec3 turning_back{kOmegaEarth_radps * r_s.y, -kOmegaEarth_radps * r_s.x, 0};
   // What tau was wrong by moves the satellite once more, by its velocity in space.
   const double u_v_space = dot(u, v_s - turning_back);
-  const double correction_s = range_m / kSpeedOfLight_mps - tau_s;
+  constexpr double kSecondsPerMetre = 1 / kSpeedOfLight_mps;
+  const double correction_s = kSecondsPerMetre * range_m - tau_s;
   out.range_m = range_m - correction_s * u_v_space;
   // rho' = u . (v_s (1 - tau') + omega tau' (r_s turning back) - v) with tau' = rho'/c.
   out.range_rate_mps = dot(u, v_s - v) / (1 + u_v_space / kSpeedOfLight_mps);

@@ -33,6 +33,8 @@ void check_options(const GnssTrackingOptions& o) {
   check_delay("reacquire", o.reacquire);
   check_delay("cold_acquire", o.cold_acquire);
   check("parity_delay", to_seconds(o.parity_delay), 0, 60);
+  check("lose_lock_below_dBHz", o.lose_lock_below_dBHz, 0, 60);
+  check("relock_hysteresis_dB", o.relock_hysteresis_dB, 0, 24);
   check("l2_loss_dB", o.l2_loss_dB, 0, 20);
   check("doppler_per_phase", o.doppler_per_phase, 0, 1000);
   check("vertical_tecu", o.vertical_tecu, 0, 1000);
@@ -79,7 +81,10 @@ GnssTracker::GnssTracker(const GnssTrackingOptions& options, const AntennaPatter
   }
   candidates_.reserve(gps::kSatellites);
   channels_.reserve(static_cast<std::size_t>(options.channels));
-  observations_.reserve(static_cast<std::size_t>(2 * options.channels));
+  const auto most = static_cast<std::size_t>(2 * options.channels);
+  observations_.reserve(most);
+  noise_streams_.reserve(most);
+  normals_.resize(most, {0, 0, 0});
 }
 
 void GnssTracker::start(GnssStart how) {
@@ -104,16 +109,20 @@ void GnssTracker::epoch(const GpsSnapshot& gps, const GpsConstellation& constell
   find_candidates(gps, antenna, faults.blocked);
   drop_channels(antenna.t);
   take_channels(antenna.t);
-  observations_.clear();
   for (GnssChannel& channel : channels_) {
     channel.reported = false;
     if (!channel.locked && channel.acquired <= antenna.t) lock(channel);
+  }
+  draw_noise();
+  observations_.clear();
+  std::size_t place = 0;
+  for (GnssChannel& channel : channels_) {
     if (!channel.locked) continue;
     const auto index = static_cast<std::size_t>(channel.prn - 1);
     if ((faults.slipped >> index & 1u) != 0) slip(channel, faults.cycles[index], antenna.t);
     slip_by_itself(channel, antenna.t, e.dt_s);
     settle_parity(channel, antenna.t);
-    measure(channel, e);
+    measure(channel, e, place++);
   }
   first_ = false;
   last_ = antenna.t;
@@ -126,29 +135,34 @@ void GnssTracker::find_candidates(const GpsSnapshot& gps, const AntennaPlace& an
   const double radius_m = norm(antenna.r_ECEF);
   std::uint32_t followed = 0;
   for (const GnssChannel& channel : channels_) followed |= 1u << (channel.prn - 1);
+  const std::uint32_t held = first_ && tracking_start_ ? ~0u : followed;
   for (int prn = 1; prn <= gps::kSatellites; ++prn) {
     const std::uint32_t bit = 1u << (prn - 1);
     if ((gps.transmitting & ~blocked & bit) == 0) continue;
     const Sight sight = sight_(antenna, radius_m, gps[prn].r_ECEF);
     if (!sight.clear) continue;
     const double cn0 = cn0_.at_cosine(sight.cos_off_boresight);
+    in_sight_ |= bit;
+    const double margin = (held & bit) != 0 ? 0 : options_.relock_hysteresis_dB;
+    if (options_.lose_lock_below_dBHz > 0 && cn0 < options_.lose_lock_below_dBHz + margin) continue;
     const double bonus = (followed & bit) != 0 ? options_.hysteresis_dB : 0;
     candidates_.push_back({prn, cn0 + bonus, sight, cn0});
-    in_sight_ |= bit;
   }
   chosen_ = std::min(candidates_.size(), static_cast<std::size_t>(options_.channels));
-  if (chosen_ == candidates_.size()) return;
-  // Equal ranks in order of PRN, so that the choice is defined.
-  std::sort(candidates_.begin(), candidates_.end(), [](const Candidate& a, const Candidate& b) {
-    return a.rank_dBHz != b.rank_dBHz ? a.rank_dBHz > b.rank_dBHz : a.prn < b.prn;
-  });
+  if (chosen_ < candidates_.size()) {
+    // Equal ranks in order of PRN, so that the choice is defined.
+    std::sort(candidates_.begin(), candidates_.end(), [](const Candidate& a, const Candidate& b) {
+      return a.rank_dBHz != b.rank_dBHz ? a.rank_dBHz > b.rank_dBHz : a.prn < b.prn;
+    });
+  }
+  chosen_of_.fill(nullptr);
+  for (std::size_t i = 0; i < chosen_; ++i) {
+    chosen_of_[static_cast<std::size_t>(candidates_[i].prn - 1)] = &candidates_[i];
+  }
 }
 
 const GnssTracker::Candidate* GnssTracker::candidate(int prn) const {
-  for (std::size_t i = 0; i < chosen_; ++i) {
-    if (candidates_[i].prn == prn) return &candidates_[i];
-  }
-  return nullptr;
+  return chosen_of_[static_cast<std::size_t>(prn - 1)];
 }
 
 void GnssTracker::drop_channels(SimTime t) {
@@ -264,7 +278,20 @@ void GnssTracker::wander(GnssChannel& channel, double dt_s) {
       keep * s.phase_multipath_m + add * s.multipath->normal(0, options_.phase_multipath_m);
 }
 
-void GnssTracker::measure(GnssChannel& channel, const Epoch& e) {
+/// All of an epoch at once, which is faster than one after another.
+void GnssTracker::draw_noise() {
+  if (!options_.noise) return;
+  noise_streams_.clear();
+  for (const GnssChannel& channel : channels_) {
+    if (channel.locked) noise_streams_.push_back(satellite(channel.prn).noise);
+  }
+  for (const GnssChannel& channel : channels_) {
+    if (channel.locked && options_.l2) noise_streams_.push_back(satellite(channel.prn).l2_noise);
+  }
+  normal_triples(noise_streams_, normals_);
+}
+
+void GnssTracker::measure(GnssChannel& channel, const Epoch& e, std::size_t place) {
   const Candidate& c = *candidate(channel.prn);
   const SatelliteState& truth = e.gps[channel.prn];
   // The receiver's clock shows the tag when GPS time is the tag less the bias.
@@ -274,27 +301,20 @@ void GnssTracker::measure(GnssChannel& channel, const Epoch& e) {
     channel.wind_up_cycles = w + std::round(channel.wind_up_cycles - w);
   }
   wander(channel, e.dt_s);
-  append(channel, e, signal, false);
-  if (options_.l2) append(channel, e, signal, true);
+  append(channel, e, signal, normals_[place], false);
+  if (options_.l2) append(channel, e, signal, normals_[noise_streams_.size() / 2 + place], true);
 }
 
 void GnssTracker::append(GnssChannel& channel, const Epoch& e, const ReceivedSignal& signal,
-                         bool l2) {
+                         const std::array<double, 3>& normals, bool l2) {
   Satellite& s = satellite(channel.prn);
   const double wavelength_m = l2 ? kL2Wavelength_m : kL1Wavelength_m;
   const double scale = l2 ? gps::kGamma : 1;
   const double cn0 = channel.cn0_dBHz - (l2 ? options_.l2_loss_dB : 0);
-  const double sigma_phase_m = phase_sigma_m(cn0, wavelength_m);
-  const double sigma_code_m = code_sigma_m(cn0);
-  double code_noise_m = 0, phase_noise_m = 0, rate_noise_mps = 0;
-  if (options_.noise) {
-    RandomStream& noise = l2 ? *s.l2_noise : *s.noise;
-    code_noise_m = sigma_code_m * noise.normal();
-    phase_noise_m = sigma_phase_m * noise.normal();
-    rate_noise_mps = options_.doppler_per_phase * sigma_phase_m * noise.normal();
-  }
-  code_noise_m += s.code_multipath_m;
-  phase_noise_m += s.phase_multipath_m;
+  const auto [sigma_code_m, sigma_phase_m] = tracking_noise(cn0, wavelength_m);
+  const double code_noise_m = sigma_code_m * normals[0] + s.code_multipath_m;
+  const double phase_noise_m = sigma_phase_m * normals[1] + s.phase_multipath_m;
+  const double rate_noise_mps = options_.doppler_per_phase * sigma_phase_m * normals[2];
   if (!l2) channel.code_noise_m = code_noise_m, channel.phase_noise_m = phase_noise_m;
 
   const bool parity_known = e.antenna.t >= s.parity_known;

@@ -33,6 +33,12 @@ struct GnssTrackingOptions {
   /// off by half a cycle. False: they are left out until it is.
   bool report_unknown_parity = false;
 
+  /// C/N0 of L1 below which a satellite is lost, L2 with it [dB-Hz], 0 to 60; it is searched for
+  /// again from `relock_hysteresis_dB` above that on. 0: never lost, as Table 2 reaches down to 21.
+  /// Receivers in use lose lock at 25 to 28.
+  double lose_lock_below_dBHz = 0;
+  double relock_hysteresis_dB = 2;  // 0 to 24
+
   bool l2 = false;                // a second observation per satellite, L2P(Y) semi-codeless
   double l2_loss_dB = 2;          // of C/N0 against L1
   bool noise = true;              // code, phase and Doppler by C/N0
@@ -80,9 +86,9 @@ struct GnssChannel {
 /// Observables  P = rho + c (b - dt_s + TGD) + I, L = rho + c (b - dt_s + TGD) - I + lambda (N +
 /// w),
 ///              D = -dL/dt / lambda by the receiver's time; each with noise by C/N0 (antenna.hpp).
-/// Streams      By satellite: "G07 noise" (three draws an observation of L1), "G07 L2 noise", "G07
-///              arc" (delays, integers, slips), "G07 multipath": what happens to one satellite
-///              moves no noise of another.
+/// Streams      By satellite: "G07 noise" (a block an observation of L1, normal_triples()), "G07 L2
+///              noise", "G07 arc" (delays, integers, slips), "G07 multipath": what happens to one
+///              satellite moves no noise of another.
 /// Allocation   None after the constructor.
 /// Checked by   test_suites/unit/models/gnss/tracking_test.cpp
 class GnssTracker {
@@ -146,8 +152,10 @@ class GnssTracker {
   void settle_parity(GnssChannel& channel, SimTime t);
   void wander(GnssChannel& channel, double dt_s);
   struct Epoch;
-  void measure(GnssChannel& channel, const Epoch& e);
-  void append(GnssChannel& channel, const Epoch& e, const ReceivedSignal& signal, bool l2);
+  void measure(GnssChannel& channel, const Epoch& e, std::size_t place);
+  void append(GnssChannel& channel, const Epoch& e, const ReceivedSignal& signal,
+              const std::array<double, 3>& normals, bool l2);
+  void draw_noise();
   const Candidate* candidate(int prn) const;
 
   GnssTrackingOptions options_;
@@ -156,9 +164,12 @@ class GnssTracker {
   std::array<Satellite, gps::kSatellites> satellites_;
   std::vector<Candidate> candidates_;  // by rank, the chosen ones first
   std::size_t chosen_ = 0;
+  std::array<const Candidate*, gps::kSatellites> chosen_of_{};  // of each satellite, or null
   std::uint32_t in_sight_ = 0;
   std::vector<GnssChannel> channels_;
   std::vector<novatel::RangeObservation> observations_;
+  std::vector<RandomStream*> noise_streams_;    // of those in lock: all of L1, then all of L2
+  std::vector<std::array<double, 3>> normals_;  // of each: code, phase, Doppler
   bool first_ = true, tracking_start_ = true, cold_ = false;
   SimTime last_;
 };

@@ -57,21 +57,32 @@ BENCHMARK_CAPTURE(BM_FirstFlight, formation_keeping, std::string("formation_keep
 BENCHMARK_CAPTURE(BM_FirstFlight, without_flight_software, std::string())
     ->Unit(benchmark::kMillisecond);
 
-/// Two spacecraft with all models and no flight software: orbits in 60x60, receivers that track,
-/// solve and log RANGE, BESTXYZ and ephemerides at every epoch.
-void BM_TwoSpacecraft_Gnss(benchmark::State& state) {
+enum Forces : std::int64_t { kGravityOnly = 0, kAllForces = 1 };
+
+FormationOptions ranging(Duration period, std::int64_t forces) {
   using novatel::LogTrigger;
-  const Duration period = state.range(0) * 1s, span = 6h;
+  FormationOptions options;
+  options.world.record = false;
+  if (forces == kGravityOnly) {
+    options.world.drag = options.world.radiation_pressure = false;
+    options.world.sun_gravity = options.world.moon_gravity = false;
+  }
+  options.gnss.period = period;
+  options.gnss.logs = {{novatel::kRangeId, LogTrigger::kOnTime, period},
+                       {novatel::kBestXyzId, LogTrigger::kOnTime, period},
+                       {novatel::kRawEphemId, LogTrigger::kOnChanged}};
+  return options;
+}
+
+/// Two spacecraft with all models and no flight software: orbits in 60x60, drag with NRLMSISE-00,
+/// radiation pressure with shadow, Sun and Moon, attitude, crosslink, and receivers that track,
+/// solve and log RANGE, BESTXYZ and ephemerides at every epoch. forces:0 has gravity alone.
+void BM_TwoSpacecraft_Gnss(benchmark::State& state) {
+  const Duration period = state.range(1) * 1s, span = 12h;
   double simulated_s = 0;
   for (auto _ : state) {
     state.PauseTiming();
-    FormationOptions options;
-    options.world.record = false;
-    options.gnss.period = period;
-    options.gnss.logs = {{novatel::kRangeId, LogTrigger::kOnTime, period},
-                         {novatel::kBestXyzId, LogTrigger::kOnTime, period},
-                         {novatel::kRawEphemId, LogTrigger::kOnChanged}};
-    FormationWorld world(options);
+    FormationWorld world(ranging(period, state.range(0)));
     state.ResumeTiming();
     world.run_for(span);
     simulated_s += to_seconds(span);
@@ -79,10 +90,8 @@ void BM_TwoSpacecraft_Gnss(benchmark::State& state) {
   state.counters["x_real_time"] = benchmark::Counter(simulated_s, benchmark::Counter::kIsRate);
 }
 BENCHMARK(BM_TwoSpacecraft_Gnss)
-    ->ArgName("period_s")
-    ->Arg(1)
-    ->Arg(10)
-    ->Arg(30)
+    ->ArgNames({"forces", "period_s"})
+    ->ArgsProduct({{kGravityOnly, kAllForces}, {1, 10, 30}})
     ->Unit(benchmark::kMillisecond);
 
 }  // namespace

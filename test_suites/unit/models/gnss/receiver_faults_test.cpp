@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <map>
 #include <memory>
@@ -270,7 +271,10 @@ TEST(GnssReceiverFaultTest, SolutionFreezesAndIsBiased) {
   scene.io().faults["freeze"] = 1;
   scene.run_until(14s);
   scene.io().faults.clear();
-  scene.io().faults["bias_y_m"] = 250;
+  const std::size_t first = scene.receiver().add_bias({0, 250, 0});
+  const std::size_t second = scene.receiver().add_bias({9, 9, 9});
+  EXPECT_NE(first, second);
+  scene.io().faults["bias " + std::to_string(first)] = 1;
   scene.run_until(15s);
   scene.io().faults.clear();
   scene.run_until(16s);
@@ -281,6 +285,7 @@ TEST(GnssReceiverFaultTest, SolutionFreezesAndIsBiased) {
   }
   EXPECT_LT(norm(got[15].position() - truth[15].position() - Vec3{0, 250, 0}), 1e-8);
   EXPECT_EQ(got[16].position(), truth[16].position());
+  EXPECT_THROW(scene.receiver().add_bias({0, std::nan(""), 0}), std::invalid_argument);
 }
 
 // c 50 us on every pseudorange at once; the phase follows, and steering takes it out again.

@@ -495,7 +495,92 @@ TEST(GnssTrackerTest, NoiseOfOneSatelliteIsNotMovedByTheLossOfAnother) {
   }
 }
 
+// Nobody is followed below the threshold, nobody taken below it and the hysteresis; those that were
+// lost come back as after any interruption, in arcs that begin at 0. A receiver without threshold
+// sees the same satellites down to 21 dB-Hz.
+TEST(GnssTrackerTest, LockIsLostAtLowCn0AndFoundAgainAboveTheHysteresis) {
+  GnssTrackingOptions options;
+  options.channels = 24;
+  options.lose_lock_below_dBHz = 27;
+  options.relock_hysteresis_dB = 3;
+  TrackingScene scene(options), all({.channels = 24});
+  std::map<int, SimTime> locked;
+  int lost = 0, taken = 0, between = 0;
+  double weakest = 99;
+  for (Duration t = 0s; t < 96min; t += 1s) {
+    scene.epoch(t), all.epoch(t);
+    EXPECT_EQ(scene.tracker().in_sight(), all.tracker().in_sight());
+    for (const GnssChannel& c : all.tracker().channels()) {
+      weakest = std::min(weakest, c.cn0_dBHz);
+      const GnssChannel* held = scene.channel(c.prn);
+      const bool must_not = c.cn0_dBHz < 27, must = c.cn0_dBHz >= 30;
+      EXPECT_FALSE(must_not && held != nullptr) << c.prn << " at " << to_seconds(t);
+      EXPECT_FALSE(must && held == nullptr) << c.prn << " at " << to_seconds(t);
+      between += held != nullptr && c.cn0_dBHz < 30;
+      lost += held == nullptr && locked.erase(c.prn) > 0;
+      if (held == nullptr || locked.count(c.prn) > 0) continue;
+      EXPECT_TRUE(t == 0s || c.cn0_dBHz >= 30) << c.prn;
+      locked[c.prn] = held->acquired, ++taken;
+    }
+  }
+  EXPECT_LT(weakest, 22);
+  EXPECT_GT(lost, 8);
+  EXPECT_GT(taken, 12);
+  EXPECT_GT(between, 100);  // held within the hysteresis
+}
+
+// The body rolls by 60 deg and back: what was lost to low C/N0 alone is back within reacquisition.
+TEST(GnssTrackerTest, LowCn0ForSomeSecondsCostsTheArc) {
+  GnssTrackingOptions options;
+  options.channels = 24;
+  options.lose_lock_below_dBHz = 27;
+  options.noise = false;
+  RandomStreams streams(1);
+  GpsConstellation gps({}, kSceneEpoch, streams);
+  GnssTracker tracker(options, AntennaPattern::patch(),
+                      [&](std::string_view purpose) -> RandomStream& {
+                        return streams.stream("chief", "gnss", purpose);
+                      });
+  tracker.start(GnssStart::kTracking);
+  const LeoScene leo;
+  std::map<int, SimTime> before;
+  std::set<int> lost;
+  for (Duration t = 0s; t <= 60s; t += 1s) {
+    AntennaPlace antenna = antenna_at(leo, t);
+    if (t >= 20s && t < 30s) {
+      const Vec3 y = antenna.R_AE.row_y, z = antenna.R_AE.row_z;
+      antenna.R_AE.row_y = 0.5 * y + std::sqrt(0.75) * z;
+      antenna.R_AE.row_z = 0.5 * z - std::sqrt(0.75) * y;
+    }
+    tracker.epoch(gps.at(antenna.t), gps, antenna, {1.5e11, 0, 0}, 0, 0, {});
+    std::set<int> now;
+    for (const GnssChannel& c : tracker.channels()) {
+      now.insert(c.prn);
+      if (t == 19s) before[c.prn] = c.acquired;
+      if (t != 60s || before.count(c.prn) == 0) continue;
+      EXPECT_TRUE(c.reported) << c.prn;
+      if (lost.count(c.prn) == 0) {
+        EXPECT_EQ(c.acquired, before[c.prn]) << c.prn;
+        continue;
+      }
+      EXPECT_GE(c.acquired, kSceneEpoch + 31s) << c.prn;  // 1 to 5 s after the first epoch
+      EXPECT_LE(c.acquired, kSceneEpoch + 35s) << c.prn;
+    }
+    if (t == 29s) {
+      for (const auto& [prn, acquired] : before) {
+        if (now.count(prn) == 0) lost.insert(prn);
+      }
+    }
+  }
+  EXPECT_GE(lost.size(), 2u);
+  EXPECT_LT(lost.size(), before.size());
+}
+
 TEST(GnssTrackerTest, OptionsOutOfRangeAreNamed) {
+  EXPECT_THAT([] { TrackingScene({.lose_lock_below_dBHz = 61}); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("lose_lock_below_dBHz = 61")));
+  EXPECT_THAT([] { TrackingScene({.relock_hysteresis_dB = -1}); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("relock_hysteresis_dB = -1")));
   EXPECT_THAT([] { TrackingScene({.channels = 25}); },
               ThrowsMessage<std::invalid_argument>(HasSubstr("channels = 25; accepted: 1 to 24")));
   EXPECT_THAT([] { TrackingScene({.channels = 17, .l2 = true}); },

@@ -54,6 +54,7 @@ class OrbitingDeviceContext final : public DeviceContext {
   void record(std::string_view, double) override {}
   void log(int, std::string_view) override {}
   double fault(std::string_view, double nominal) const override { return nominal; }
+  bool may_be_faulty() const override { return false; }
 
  private:
   SimTime now_ = kEpoch;
