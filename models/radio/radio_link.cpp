@@ -66,13 +66,13 @@ RandomStream& stream(RandomStreams& streams, std::string_view from, std::string_
   return streams.stream(from, "link/" + std::string(to), purpose);
 }
 
-// Rounded up to nanoseconds.
+}  // namespace
+
 Duration time_on_air(std::size_t bytes, std::uint64_t rate_bps) {
+  if (rate_bps == 0) return Duration::zero();
   constexpr std::uint64_t kBitNs = 8'000'000'000;  // bits per byte times nanoseconds per second
   return Duration(static_cast<std::int64_t>((bytes * kBitNs + rate_bps - 1) / rate_bps));
 }
-
-}  // namespace
 
 LogNormalDelay log_normal_delay(double low_s, double high_s, double k) {
   if (!(low_s > 0 && high_s >= low_s && std::isfinite(high_s) && k > 0)) {

@@ -25,6 +25,9 @@ struct LogNormalDelay {
 /// @throws std::invalid_argument  unless 0 < low_s <= high_s, finite, and k > 0.
 LogNormalDelay log_normal_delay(double low_s, double high_s, double k = 3);
 
+/// Rounded up to nanoseconds; 0 at a rate of 0.
+Duration time_on_air(std::size_t bytes, std::uint64_t rate_bps);
+
 struct RadioLinkOptions {
   LogNormalDelay delay = {};      // median 1 s; 99.7 % within 0.1 s to 10 s
   Duration minimum_delay = 1ms;   // no message arrives sooner; at least 0
