@@ -72,4 +72,24 @@ std::vector<FlightPort> checked_ports(const ::orrery_flight* flight) {
   return ports;
 }
 
+std::uint32_t find_port(const std::vector<FlightPort>& ports, std::string_view name,
+                        PortDirection direction) {
+  for (std::uint32_t i = 0; i < ports.size(); ++i) {
+    if (ports[i].direction == direction && ports[i].name == name) return i;
+  }
+  return UINT32_MAX;
+}
+
+std::uint32_t require_input_port(std::string_view function, const std::string& process,
+                                 const std::vector<FlightPort>& ports, std::string_view name) {
+  const std::uint32_t index = find_port(ports, name, PortDirection::kIn);
+  if (index != UINT32_MAX) return index;
+  std::string known;
+  for (const FlightPort& port : ports) {
+    if (port.direction == PortDirection::kIn) known += (known.empty() ? "" : ", ") + port.name;
+  }
+  throw std::invalid_argument(std::string(function) + ": " + process + " has no input port \"" +
+                              std::string(name) + "\"; it has " + (known.empty() ? "none" : known));
+}
+
 }  // namespace orrery::internal

@@ -1,0 +1,123 @@
+/// The inside of a flight computer: its queue, its tick, its lives.
+#pragma once
+
+#include <orrery/harness/flight/call_timing.hpp>
+#include <orrery/harness/flight/flight_computer.hpp>
+#include <orrery/harness/flight/payload_pool.hpp>
+#include <orrery/harness/flight/port_table.hpp>
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace orrery {
+namespace internal {
+
+inline constexpr EventKind kBoot{100, "flight boot"};
+inline constexpr EventKind kInput{101, "flight input"};
+inline constexpr EventKind kTick{102, "flight tick"};
+inline constexpr EventKind kOutput{103, "flight output"};
+inline constexpr EventKind kProcessorFree{104, "processor free"};
+inline constexpr EventKind kReboot{105, "flight reboot"};
+inline constexpr EventKind kPowerCycle{106, "flight power cycle"};
+inline constexpr EventKind kKill{107, "flight kill"};
+inline constexpr EventKind kBootLoop{108, "boot_loop"};
+
+}  // namespace internal
+
+class FlightComputer::Impl {
+ public:
+  Impl(EventLoop& loop, OwnerId owner, FlightProcessOptions options, Hooks hooks);
+
+  void boot();
+  void reset(SimTime t, const EventKind& kind, ResetCause cause, Duration boot_delay);
+  void shut_down();
+  void deliver(std::string_view port, Bytes bytes, OwnerId origin);
+  std::uint32_t find_port(std::string_view name, PortDirection direction) const {
+    return internal::find_port(ports, name, direction);
+  }
+  std::int64_t onboard_ns() const { return clock.onboard_ns(loop_.now()); }
+  bool alive() const { return process != nullptr && process->alive(); }
+  HeapFigures heap() const;
+  Duration host_time() const;
+
+  FlightProcessOptions options;
+  std::unique_ptr<FlightProcess> process;
+  std::vector<FlightPort> ports;
+  OnboardClock clock;
+  HeapHistory history;
+  std::uint64_t crashes = 0, boots = 0, calls = 0, rejected = 0, inputs_lost = 0,
+                outputs_discarded = 0;
+  std::vector<std::uint64_t> dropped;  // by port
+  bool boot_loop = false;
+
+ private:
+  struct Waiting {
+    std::uint32_t port, payload;
+    SimTime arrival;
+  };
+
+  void on_input(std::uint32_t port, std::uint32_t payload);
+  void on_tick();
+  void on_output(std::uint32_t port, std::uint32_t payload, std::uint32_t life);
+  void end_call(const internal::CallTiming& timing, CallOutcome outcome);
+
+  void on_boot(ResetCause cause);
+  void on_reset(const EventKind& kind, ResetCause cause, Duration boot_delay);
+  void on_boot_loop();
+  void schedule_boot(SimTime t, ResetCause cause);
+  bool boots_too_often();
+  void load_afresh();
+  void end_life();
+  void on_processor_free();
+
+  bool busy() const { return loop_.now() < busy_until_; }
+  bool others_wait() const { return !waiting_.empty() || tick_waits_; }
+  void enqueue(std::uint32_t port, std::uint32_t payload);
+  void wake_when_free();
+  void run_input(std::uint32_t port, std::uint32_t payload);
+  void run_tick();
+  void take_over(CallOutcome outcome);
+  void release_outputs();
+  void set_tick(std::int64_t onboard_ns);
+  void withdraw_tick();
+  bool makes_progress();
+  void bury();
+  void lose_what_waits();
+  void tell(CallOutcome outcome);
+  void warn(const std::string& line);
+
+  EventLoop& loop_;
+  OwnerId owner_;
+  Hooks hooks_;
+  internal::PayloadPool payloads_;
+
+  internal::CallTimings timings_;
+
+  // Of earlier lives.
+  FlightProcess::Storage storage_;
+  std::uint64_t high_water_before_ = 0;
+  Duration host_time_before_{};
+
+  bool booted_ = false;  // or about to be
+  EventHandle boot_event_;
+  std::vector<SimTime> recent_boots_;
+  SimTime busy_until_;
+  std::vector<Waiting> waiting_;  // in order of arrival
+  std::uint64_t waiting_bytes_ = 0;
+  EventHandle free_event_;  // pending while something waits
+
+  EventHandle tick_event_;
+  bool tick_waits_ = false;  // it was due while the processor was busy
+  SimTime tick_due_;
+  bool warned_of_tick_ = false;
+  SimTime last_tick_;
+  int ticks_here_ = 0;
+
+  std::uint32_t life_ = 0;  // counts ends: an output belongs to one life
+  SimTime died_;
+};
+
+}  // namespace orrery

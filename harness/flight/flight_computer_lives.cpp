@@ -1,0 +1,140 @@
+// How the lives of a process begin and end: boots, resets, crashes.
+
+#include <orrery/harness/flight/flight_computer_impl.hpp>
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace orrery {
+namespace {
+
+constexpr std::size_t kMostBoots = 10;  // within kBootWindow
+constexpr Duration kBootWindow = 60s;
+
+}  // namespace
+
+void FlightComputer::Impl::boot() {
+  if (booted_) {
+    throw std::logic_error("FlightComputer::boot: " + process_name(options) + " was booted before");
+  }
+  booted_ = true;
+  schedule_boot(loop_.now(), ResetCause::kPowerOn);
+}
+
+void FlightComputer::Impl::schedule_boot(SimTime t, ResetCause cause) {
+  boot_event_ = loop_.schedule(t, {Phase::kFault, owner_, owner_, &internal::kBoot},
+                               [this, cause] { on_boot(cause); });
+}
+
+void FlightComputer::Impl::on_boot(ResetCause cause) {
+  boot_event_ = {};
+  if (boots_too_often()) {
+    boot_loop = true;
+    loop_.schedule(loop_.now(), {Phase::kFault, owner_, owner_, &internal::kBootLoop},
+                   [this] { on_boot_loop(); });
+    return;
+  }
+  if (boots > 0) load_afresh();
+  const auto boot_count = static_cast<std::uint32_t>(boots++);
+  end_call(timings_.create(), process->create(loop_.now(), onboard_ns(), boot_count, cause));
+}
+
+void FlightComputer::Impl::on_boot_loop() {
+  warn("boot loop: more than " + std::to_string(kMostBoots) + " boots within " +
+       to_string(kBootWindow) + "; the process stays off");
+}
+
+bool FlightComputer::Impl::boots_too_often() {
+  const SimTime now = loop_.now();
+  std::erase_if(recent_boots_, [now](SimTime t) { return now - t >= kBootWindow; });
+  if (recent_boots_.size() == kMostBoots) return true;
+  recent_boots_.push_back(now);
+  return false;
+}
+
+// The old one goes first, so that file and arena are those of its first life, and so are pointers.
+void FlightComputer::Impl::load_afresh() {
+  if (process != nullptr) {
+    high_water_before_ = std::max(high_water_before_, process->heap().high_water_bytes);
+    host_time_before_ += process->host_time_in_flight();
+    storage_ = process->storage();
+    process.reset();
+  }
+  process = std::make_unique<FlightProcess>(options);
+  process->set_storage(storage_);
+}
+
+HeapFigures FlightComputer::Impl::heap() const {
+  HeapFigures figures = process == nullptr ? HeapFigures{} : process->heap();
+  figures.high_water_bytes = std::max(figures.high_water_bytes, high_water_before_);
+  return figures;
+}
+
+Duration FlightComputer::Impl::host_time() const {
+  return host_time_before_ + (process == nullptr ? Duration{} : process->host_time_in_flight());
+}
+
+void FlightComputer::Impl::reset(SimTime t, const EventKind& kind, ResetCause cause,
+                                 Duration boot_delay) {
+  if (boot_delay <= Duration{0}) {
+    throw std::invalid_argument("FlightComputer: boot delay = " + to_string(boot_delay) + " of " +
+                                process_name(options) + "; it is above 0");
+  }
+  if (!booted_ && t <= loop_.now()) {
+    throw std::logic_error("FlightComputer: " + process_name(options) +
+                           " is to be reset, or killed, before it has booted");
+  }
+  loop_.schedule(t, {Phase::kFault, owner_, owner_, &kind},
+                 [this, &kind, cause, boot_delay] { on_reset(kind, cause, boot_delay); });
+}
+
+void FlightComputer::Impl::on_reset(const EventKind& kind, ResetCause cause, Duration boot_delay) {
+  if (alive()) {
+    process->cut_off();
+    end_life();
+  }
+  loop_.cancel(boot_event_);
+  boot_event_ = {};
+  boot_loop = false;
+  if (&kind != &internal::kKill) schedule_boot(loop_.now() + boot_delay, cause);
+  if (&kind == &internal::kPowerCycle) {
+    if (!options.clock_keeps_power) clock.set_offset(-Duration(to_ns(loop_.now())));
+    if (hooks_.on_power_cycle) hooks_.on_power_cycle();
+  }
+}
+
+void FlightComputer::Impl::bury() {
+  ++crashes;
+  end_life();
+}
+
+void FlightComputer::Impl::end_life() {
+  busy_until_ = loop_.now();
+  ++life_;
+  died_ = loop_.now();
+  lose_what_waits();
+}
+
+void FlightComputer::Impl::lose_what_waits() {
+  withdraw_tick();
+  loop_.cancel(free_event_);
+  free_event_ = {};
+  inputs_lost += waiting_.size();
+  for (const Waiting& w : waiting_) payloads_.give_back(w.payload);
+  waiting_.clear();
+  waiting_bytes_ = 0;
+}
+
+void FlightComputer::Impl::shut_down() {
+  loop_.cancel(boot_event_);
+  if (!alive()) return;
+  const CallOutcome outcome = process->shut_down(loop_.now(), onboard_ns());
+  if (outcome == CallOutcome::kCrashed) {
+    bury();
+  } else {
+    lose_what_waits();
+  }
+  tell(outcome);
+}
+
+}  // namespace orrery
