@@ -81,6 +81,10 @@ class Device {
   virtual std::string_view name() const = 0;
   /// At each power-on.
   virtual void start(DeviceContext& io) = 0;
+  /// A fault of that name was set, which fault() may give from now on: for names that carry
+  /// numbers, so that the name alone says what the fault does.
+  /// @throws std::invalid_argument  numbers missing or out of range.
+  virtual void fault_set(std::string_view name) { (void)name; }
   /// Bytes that flight software wrote to the connected port.
   virtual void from_flight(DeviceContext& io, Bytes bytes) { (void)io, (void)bytes; }
   /// A frame from another spacecraft's device of the same name.

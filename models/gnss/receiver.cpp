@@ -6,6 +6,7 @@
 #include <orrery/models/orbit/earth.hpp>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
@@ -59,6 +60,40 @@ Mat3 antenna_axes(const Vec3& boresight_B) {
   return {x, cross(z, x), z};
 }
 
+// Faults whose names carry numbers.
+constexpr std::string_view kSector = "sector ", kBias = "bias ";
+
+void check_sector(const SkySector& s) {
+  const double width_deg = s.azimuth_to_deg - s.azimuth_from_deg;
+  if (width_deg > 0 && width_deg <= 360 && s.elevation_to_deg > s.elevation_from_deg) return;
+  throw std::invalid_argument("GnssReceiver: sector of " + to_text(width_deg) +
+                              " deg in azimuth and " +
+                              to_text(s.elevation_to_deg - s.elevation_from_deg) +
+                              " deg in elevation; accepted: above 0, azimuth to 360");
+}
+
+void check_bias(const Vec3& by_ECEF) {
+  if (is_finite(by_ECEF)) return;
+  throw std::invalid_argument("GnssReceiver: bias of the solution is not finite");
+}
+
+template <std::size_t kCount>
+std::array<double, kCount> numbers_of(std::string_view name, std::string_view prefix) {
+  std::array<double, kCount> out{};
+  const char *at = name.data() + prefix.size(), *const end = name.data() + name.size();
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const auto [after, error] = std::from_chars(at, end, out[i]);
+    const bool last = i + 1 == kCount;
+    if (error != std::errc{} || (last ? after != end : after == end || *after != ' ')) {
+      throw std::invalid_argument("GnssReceiver: fault '" + std::string(name) + "'; accepted: '" +
+                                  std::string(prefix) + "' and " + std::to_string(kCount) +
+                                  " numbers");
+    }
+    at = after + !last;
+  }
+  return out;
+}
+
 Duration until_next_epoch(SimTime now, Duration period) {
   const Duration since_epoch = now.time_since_epoch() % period;
   return since_epoch == 0ns ? 0ns : period - since_epoch;
@@ -102,26 +137,32 @@ GnssReceiver::GnssReceiver(const Options& options, std::shared_ptr<GpsConstellat
   }
 }
 
-std::size_t GnssReceiver::add_sector(const SkySector& s) {
-  const double width_deg = s.azimuth_to_deg - s.azimuth_from_deg;
-  if (!(width_deg > 0 && width_deg <= 360 && s.elevation_to_deg > s.elevation_from_deg)) {
-    throw std::invalid_argument("GnssReceiver: sector of " + to_text(width_deg) +
-                                " deg in azimuth and " +
-                                to_text(s.elevation_to_deg - s.elevation_from_deg) +
-                                " deg in elevation; accepted: above 0, azimuth to 360");
-  }
-  sectors_.push_back(s);
-  sector_faults_.push_back("sector " + std::to_string(sectors_.size() - 1));
-  return sectors_.size() - 1;
+std::string GnssReceiver::sector_fault(const SkySector& s) {
+  check_sector(s);
+  return std::string(kSector) + to_text(s.azimuth_from_deg) + ' ' + to_text(s.azimuth_to_deg) +
+         ' ' + to_text(s.elevation_from_deg) + ' ' + to_text(s.elevation_to_deg);
 }
 
-std::size_t GnssReceiver::add_bias(const Vec3& by_ECEF) {
-  if (!is_finite(by_ECEF)) {
-    throw std::invalid_argument("GnssReceiver: bias of the solution is not finite");
+std::string GnssReceiver::bias_fault(const Vec3& by_ECEF) {
+  check_bias(by_ECEF);
+  return std::string(kBias) + to_text(by_ECEF.x) + ' ' + to_text(by_ECEF.y) + ' ' +
+         to_text(by_ECEF.z);
+}
+
+void GnssReceiver::fault_set(std::string_view name) {
+  const auto same = [name](const auto& fault) { return fault.name == name; };
+  if (name.starts_with(kSector) && std::ranges::none_of(sectors_, same)) {
+    const auto n = numbers_of<4>(name, kSector);
+    const SkySector sector{n[0], n[1], n[2], n[3]};
+    check_sector(sector);
+    sectors_.push_back({std::string(name), sector});
   }
-  biases_ECEF_.push_back(by_ECEF);
-  bias_faults_.push_back("bias " + std::to_string(biases_ECEF_.size() - 1));
-  return biases_ECEF_.size() - 1;
+  if (name.starts_with(kBias) && std::ranges::none_of(biases_, same)) {
+    const auto n = numbers_of<3>(name, kBias);
+    const Vec3 by_ECEF{n[0], n[1], n[2]};
+    check_bias(by_ECEF);
+    biases_.push_back({std::string(name), by_ECEF});
+  }
 }
 
 void GnssReceiver::start(DeviceContext& io) {
@@ -246,13 +287,12 @@ bool GnssReceiver::in_blocked_sector(DeviceContext& io, const Vec3& r_ECEF,
   const Vec3 east = unit(cross(Vec3{0, 0, 1}, up)), north = cross(up, east);
   const double azimuth_deg = std::atan2(dot(u, east), dot(u, north)) * kDegrees;
   const double elevation_deg = std::asin(std::clamp(dot(u, up), -1.0, 1.0)) * kDegrees;
-  for (std::size_t k = 0; k < sectors_.size(); ++k) {
-    const SkySector& s = sectors_[k];
+  for (const auto& [name, s] : sectors_) {
     const double turn_deg = azimuth_deg - s.azimuth_from_deg;
     const double inside_deg = turn_deg - 360 * std::floor(turn_deg / 360);
     if (inside_deg < s.azimuth_to_deg - s.azimuth_from_deg &&
         elevation_deg >= s.elevation_from_deg && elevation_deg < s.elevation_to_deg &&
-        io.fault(sector_faults_[k], 0.0) != 0.0) {
+        io.fault(name, 0.0) != 0.0) {
       return true;
     }
   }
@@ -302,8 +342,8 @@ void GnssReceiver::solve(DeviceContext& io, const AntennaPlace& antenna) {
   solution_.computed = usable >= kFewestSatellites;
   if (!solution_.computed) return;
   solution_.r_ECEF = antenna.r_ECEF + noise_r;
-  for (std::size_t k = 0; k < biases_ECEF_.size(); ++k) {
-    if (io.fault(bias_faults_[k], 0.0) != 0.0) solution_.r_ECEF += biases_ECEF_[k];
+  for (const BiasFault& bias : biases_) {
+    if (io.fault(bias.name, 0.0) != 0.0) solution_.r_ECEF += bias.by_ECEF;
   }
   solution_.v_ECEF = antenna.v_ECEF + noise_v;
   if (!time_known_) {

@@ -52,11 +52,11 @@ struct SkySector {
 /// Time          FINESTEERING while |bias| < 100 ns, else COARSE; UNKNOWN from a cold start to the
 ///               first solution.
 /// Faults        "outage": hears and says nothing; "outage G07": does not hear one satellite;
-///               "sector k": nothing from the k-th sector (add_sector). "slip G07": that many
+///               sector_fault(): nothing from that part of the sky. "slip G07": that many
 ///               cycles (halves allowed) are added to the phase at each epoch at which it is not 0.
 ///               "restart": 1 warm, 2 cold. "clock_jump_s": added to the bias at each epoch.
-///               "freeze": the solution repeats itself. "bias k": the solution is off by the k-th
-///               vector (add_bias). "week_offset": weeks added to every week in the headers.
+///               "freeze": the solution repeats itself. bias_fault(): the solution is off by a
+///               vector in ECEF. "week_offset": weeks added to every week in the headers.
 ///               "withhold", "withhold G07": no ephemeris is received. Of each message: "corrupt":
 ///               that many bits are turned over, "cut": that many bytes are missing at its end.
 class GnssReceiver final : public Device {
@@ -72,11 +72,12 @@ class GnssReceiver final : public Device {
   /// LOG, UNLOG and UNLOGALL (log_command.hpp); answers go back at once.
   void from_flight(DeviceContext& io, Bytes bytes) override;
 
-  /// The number k for the fault "sector k". @throws std::invalid_argument  an empty sector.
-  std::size_t add_sector(const SkySector& sector);
-  /// The number k for the fault "bias k", of the solution in ECEF [m]: one fault, so that all axes
-  /// have it or none, however often it is drawn. @throws std::invalid_argument  not finite.
-  std::size_t add_bias(const Vec3& by_ECEF);
+  /// Takes up faults whose names carry numbers; std::invalid_argument names what is wrong with
+  /// them.
+  void fault_set(std::string_view name) override;
+  /// The names of such faults: "sector 90 270 -90 90" [deg], "bias 0 250 0" [m].
+  static std::string sector_fault(const SkySector& sector);
+  static std::string bias_fault(const Vec3& by_ECEF);
   /// The list of logs, to be changed between epochs as LOG and UNLOG would.
   novatel::LogSchedule& logs() { return logs_; }
   Duration period() const { return options_.period; }
@@ -98,6 +99,14 @@ class GnssReceiver final : public Device {
     bool computed = false;
     int satellites = 0;
     Vec3 r_ECEF, v_ECEF;
+  };
+  struct SectorFault {
+    std::string name;
+    SkySector sector;
+  };
+  struct BiasFault {
+    std::string name;
+    Vec3 by_ECEF;
   };
   /// Names of the faults of one satellite, made once.
   struct FaultNames {
@@ -128,10 +137,8 @@ class GnssReceiver final : public Device {
   std::optional<GnssTracker> tracker_;
   novatel::LogSchedule logs_;
   std::optional<novatel::LogCommandReader> commands_;  // of this power-on
-  std::vector<SkySector> sectors_;
-  std::vector<std::string> sector_faults_;
-  std::vector<Vec3> biases_ECEF_;
-  std::vector<std::string> bias_faults_;
+  std::vector<SectorFault> sectors_;
+  std::vector<BiasFault> biases_;
   std::array<FaultNames, gps::kSatellites> fault_names_;
   std::array<Ephemeris, gps::kSatellites> ephemerides_;
   RandomStream *position_noise_ = nullptr, *velocity_noise_ = nullptr, *clock_noise_ = nullptr;

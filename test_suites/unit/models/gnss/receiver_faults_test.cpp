@@ -244,11 +244,12 @@ TEST(GnssReceiverStartTest, WarmRestartKeepsTheEphemerides) {
 
 TEST(GnssReceiverFaultTest, SectorIsNotHeard) {
   ReceiverScene scene(every_second());
-  const std::size_t k =
-      scene.receiver().add_sector({.azimuth_from_deg = 90, .azimuth_to_deg = 270});
+  const std::string south =
+      GnssReceiver::sector_fault({.azimuth_from_deg = 90, .azimuth_to_deg = 270});
+  scene.receiver().fault_set(south);
   scene.run_until(30s);
   const std::size_t before = scene.receiver().tracker()->channels().size();
-  scene.io().faults["sector " + std::to_string(k)] = 1;
+  scene.io().faults[south] = 1;
   scene.run_until(40s);
   const std::size_t during = scene.receiver().tracker()->channels().size();
   EXPECT_LT(during, before);
@@ -271,10 +272,11 @@ TEST(GnssReceiverFaultTest, SolutionFreezesAndIsBiased) {
   scene.io().faults["freeze"] = 1;
   scene.run_until(14s);
   scene.io().faults.clear();
-  const std::size_t first = scene.receiver().add_bias({0, 250, 0});
-  const std::size_t second = scene.receiver().add_bias({9, 9, 9});
-  EXPECT_NE(first, second);
-  scene.io().faults["bias " + std::to_string(first)] = 1;
+  EXPECT_EQ(GnssReceiver::bias_fault({0, 250, 0}), "bias 0 250 0");
+  scene.receiver().fault_set("bias 0 250 0");
+  scene.receiver().fault_set("bias 9 9 9");
+  scene.receiver().fault_set("bias 0 250 0");  // given twice, it is one
+  scene.io().faults["bias 0 250 0"] = 1;
   scene.run_until(15s);
   scene.io().faults.clear();
   scene.run_until(16s);
@@ -285,7 +287,23 @@ TEST(GnssReceiverFaultTest, SolutionFreezesAndIsBiased) {
   }
   EXPECT_LT(norm(got[15].position() - truth[15].position() - Vec3{0, 250, 0}), 1e-8);
   EXPECT_EQ(got[16].position(), truth[16].position());
-  EXPECT_THROW(scene.receiver().add_bias({0, std::nan(""), 0}), std::invalid_argument);
+}
+
+TEST(GnssReceiverFaultTest, NamesThatCarryNumbersAreRead) {
+  GnssReceiver receiver;
+  const auto refused = [](const char* name) {
+    return testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr(name));
+  };
+  for (const char* name : {"bias 1 2", "bias 1 2 3 4", "bias 1 2 x", "bias ", "bias 1  2 3",
+                           "bias 1 2 3 ", "sector 1 2 3"}) {
+    EXPECT_THAT([&] { receiver.fault_set(name); }, refused(name));
+  }
+  EXPECT_THAT([&] { receiver.fault_set("bias 0 nan 0"); }, refused("not finite"));
+  EXPECT_THAT([&] { GnssReceiver::bias_fault({0, std::nan(""), 0}); }, refused("not finite"));
+  EXPECT_THAT([&] { receiver.fault_set("sector 90 90 0 90"); }, refused("sector of 0 deg"));
+  EXPECT_EQ(GnssReceiver::sector_fault({.azimuth_from_deg = 0.1, .azimuth_to_deg = 270}),
+            "sector 0.1 270 -90 90");
+  EXPECT_NO_THROW(receiver.fault_set("slip G07"));
 }
 
 // c 50 us on every pseudorange at once; the phase follows, and steering takes it out again.
