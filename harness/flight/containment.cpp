@@ -359,6 +359,7 @@ class SignalStack {
     munmap(memory_, kBytes);
   }
   const sigset_t& mask() const { return mask_; }
+  void renew_timer() { timer_.emplace(); }
 
  private:
   static constexpr std::size_t kBytes = 128 * 1024;
@@ -403,6 +404,10 @@ struct ExceptionState {
 }
 
 }  // namespace
+
+void renew_call_timer() {
+  signal_stack_of_this_thread().renew_timer();
+}
 
 bool run_contained(ContainedProcess& process, void (*function)(void*), void* argument,
                    CrashCapture& capture) {

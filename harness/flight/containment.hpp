@@ -64,6 +64,10 @@ ContainedProcess* running_process();
 /// Ends the call of flight code that is running now, as a crash. Returns only if none is.
 void end_running_call(CrashKind kind, const char* message);
 
+/// In a child process after a fork: this thread's limit of CPU time gets a timer of its own, since
+/// none is inherited.
+void renew_call_timer();
+
 /// Within a host callback: simulator code, without heap. What goes wrong in it is not contained.
 /// Trivial to leave behind by a crash; hence no members that own anything.
 class SimulatorScope {

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace orrery {
@@ -35,6 +36,9 @@ class CsvWriter {
 
   /// @throws std::logic_error  within a row. std::runtime_error  the rest cannot be written.
   void close();
+  /// As of OutputFile.
+  void flush() { file_.flush(); }
+  void continue_in(std::filesystem::path path) { file_.continue_in(std::move(path)); }
 
  private:
   void begin_field();

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 
 namespace orrery {
 
@@ -43,6 +44,9 @@ class OemWriter {
   /// @throws std::logic_error    no state was written: an OEM without one is not valid.
   ///         std::runtime_error  the rest cannot be written.
   void close();
+  /// As of OutputFile.
+  void flush() { file_.flush(); }
+  void continue_in(std::filesystem::path path) { file_.continue_in(std::move(path)); }
 
  private:
   void begin_segment(SimTime t);

@@ -64,6 +64,19 @@ void OutputFile::flush() {
   if (!file_) fail("cannot be written");
 }
 
+void OutputFile::continue_in(std::filesystem::path path) {
+  require_open();
+  file_.close();
+  std::error_code error;
+  std::filesystem::copy_file(path_, path, std::filesystem::copy_options::overwrite_existing, error);
+  path_ = std::move(path);
+  errno = error.value();
+  if (error) fail("cannot be written");
+  // Not with ios::app, which would forbid overwrite().
+  file_.open(path_, std::ios::binary | std::ios::in | std::ios::out | std::ios::ate);
+  if (!file_) fail("cannot be opened for writing");
+}
+
 void OutputFile::require_open() const {
   if (!file_.is_open()) throw std::logic_error("OutputFile: " + path_.string() + " is closed");
 }

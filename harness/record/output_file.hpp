@@ -34,10 +34,16 @@ class OutputFile {
   /// @throws std::runtime_error  the rest cannot be written.
   void close();
 
+  /// Hands what is buffered to the system. @throws std::runtime_error  it cannot be written.
+  void flush();
+  /// Goes on in another file, which begins as a copy of this one: in a child process after a fork,
+  /// before which flush() was called. This one stays as it is.
+  /// @throws std::runtime_error  it cannot be read or the other one not written.
+  void continue_in(std::filesystem::path path);
+
   const std::filesystem::path& path() const { return path_; }
 
  private:
-  void flush();
   void require_open() const;
   [[noreturn]] void fail(const char* what) const;
 

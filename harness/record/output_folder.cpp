@@ -85,6 +85,10 @@ std::optional<int> claimed(const fs::path& folder) {
   return {};
 }
 
+fs::path hidden_branch(const fs::path& folder, std::string_view name) {
+  return folder / (".branch-" + std::string(name) + ".partial");
+}
+
 // Swaps two folders in one step. False: this file system cannot.
 bool exchange(const fs::path& a, const fs::path& b) {
   if (renameat2(AT_FDCWD, a.c_str(), AT_FDCWD, b.c_str(), RENAME_EXCHANGE) == 0) return true;
@@ -131,8 +135,23 @@ void OutputFolder::close() {
   while (!try_to_put_in_place()) {
   }
   closed_ = true;
+  if (lock_ >= 0) ::close(lock_);
+  lock_ = -1;
+}
+
+void OutputFolder::enter_branch(std::string_view name) {
+  if (closed_) throw std::logic_error("OutputFolder: " + path_.string() + " is closed");
+  const std::string folder = "branch-" + std::string(name);
+  path_ = partial_ / folder;
+  partial_ = hidden_branch(partial_, name);
   ::close(lock_);
   lock_ = -1;
+  create_tree(partial_);
+}
+
+void OutputFolder::discard_branch(std::string_view name) noexcept {
+  std::error_code ignored;
+  fs::remove_all(hidden_branch(partial_, name), ignored);
 }
 
 // False: another run of this name was put in place meanwhile.

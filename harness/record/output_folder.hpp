@@ -34,6 +34,13 @@ class OutputFolder {
   ///         std::logic_error       after close(). std::runtime_error  as above.
   std::filesystem::path file(const std::filesystem::path& relative) const;
 
+  /// In a child process after a fork: files go to the folder `branch-<name>` within this one from
+  /// here on, which close() puts in its place there. The parent's lock stays the parent's.
+  /// @throws as the constructor.
+  void enter_branch(std::string_view name);
+  /// In the parent: removes what a branch left that did not close its folder.
+  void discard_branch(std::string_view name) noexcept;
+
   /// Where the files are once closed.
   const std::filesystem::path& path() const { return path_; }
 
