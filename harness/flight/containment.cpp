@@ -1,4 +1,5 @@
 #include <orrery/harness/flight/containment.hpp>
+#include <orrery/harness/flight/file_services.hpp>
 #include <orrery/harness/flight/floating_point.hpp>
 #include <orrery/harness/flight/virtual_services.hpp>
 #include <orrery/harness/heap/interposition.hpp>
@@ -192,13 +193,14 @@ std::int64_t cpu_time_ns() {
   return std::int64_t{1'000'000'000} * t.tv_sec + t.tv_nsec;
 }
 
-// Asked in a signal handler. A debugger may have come at any time.
+// Asked in a signal handler. A debugger may have come at any time. By system calls, since open and
+// read would be those of the flight code that is running.
 bool is_traced() {
   char text[4096];
-  const int file = open("/proc/self/status", O_RDONLY | O_CLOEXEC);
+  const long file = syscall(SYS_openat, AT_FDCWD, "/proc/self/status", O_RDONLY | O_CLOEXEC);
   if (file < 0) return false;
-  const ssize_t bytes = read(file, text, sizeof text - 1);
-  close(file);
+  const ssize_t bytes = syscall(SYS_read, file, text, sizeof text - 1);
+  syscall(SYS_close, file);
   text[std::max<ssize_t>(bytes, 0)] = 0;
   const char* line = std::strstr(text, "TracerPid:");
   return line != nullptr && std::strtol(line + std::strlen("TracerPid:"), nullptr, 10) != 0;
@@ -336,6 +338,7 @@ void install_once() {
     previous_terminate = std::set_terminate(on_terminate);
     process_hooks = &kProcessHooks;
     install_service_hooks();
+    install_file_view();
   });
 }
 

@@ -21,6 +21,7 @@ struct CrashCapture {
   int frame_count = 0;
 };
 
+class FileServices;
 class VirtualServices;
 
 /// A function that a library wants called at the end of its process.
@@ -35,6 +36,7 @@ struct ContainedProcess {
   SimulatedHeap* heap = nullptr;        // null: the system's
   FlightStack* stack = nullptr;         // null: the caller's
   VirtualServices* services = nullptr;  // null: the host's
+  FileServices* files = nullptr;        // likewise
   std::int64_t host_limit_ns = 0;       // of thread CPU time in one call; 0: none
   std::vector<ExitFunction> exit_functions;
   bool changed_floating_point = false;  // set when a call left the control registers changed

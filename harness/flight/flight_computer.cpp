@@ -84,6 +84,9 @@ const HeapHistory& FlightComputer::heap_history() const {
 FlightProcess* FlightComputer::process() {
   return impl_->process.get();
 }
+NonVolatileMemory& FlightComputer::memory() {
+  return *impl_->memory;
+}
 std::int64_t FlightComputer::onboard_ns() const {
   return impl_->onboard_ns();
 }

@@ -99,6 +99,8 @@ class FlightComputer {
   const HeapHistory& heap_history() const;
   /// For its heap; calling it is the computer's. Another one after a reboot, null while off.
   FlightProcess* process();
+  /// Of all its lives.
+  NonVolatileMemory& memory();
   std::int64_t onboard_ns() const;  // what the spacecraft's clock shows now
   OnboardClock& clock();
   Duration host_time_in_flight() const;  // for reports only

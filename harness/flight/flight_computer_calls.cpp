@@ -20,6 +20,7 @@ FlightComputer::Impl::Impl(EventLoop& loop, OwnerId owner, FlightProcessOptions 
                            Hooks hooks)
     : options(std::move(flight_options)),
       process(std::make_unique<FlightProcess>(options)),
+      memory(process->memory()),
       ports(process->ports()),
       history(loop.now()),
       loop_(loop),

@@ -45,6 +45,7 @@ class FlightComputer::Impl {
 
   FlightProcessOptions options;
   std::unique_ptr<FlightProcess> process;
+  std::shared_ptr<NonVolatileMemory> memory;  // of all its lives
   std::vector<FlightPort> ports;
   OnboardClock clock;
   HeapHistory history;
@@ -97,7 +98,6 @@ class FlightComputer::Impl {
   internal::CallTimings timings_;
 
   // Of earlier lives.
-  FlightProcess::Storage storage_;
   std::uint64_t high_water_before_ = 0;
   Duration host_time_before_{};
 

@@ -57,11 +57,9 @@ void FlightComputer::Impl::load_afresh() {
   if (process != nullptr) {
     high_water_before_ = std::max(high_water_before_, process->heap().high_water_bytes);
     host_time_before_ += process->host_time_in_flight();
-    storage_ = process->storage();
     process.reset();
   }
-  process = std::make_unique<FlightProcess>(options);
-  process->set_storage(storage_);
+  process = std::make_unique<FlightProcess>(options, memory);
 }
 
 HeapFigures FlightComputer::Impl::heap() const {
@@ -98,6 +96,7 @@ void FlightComputer::Impl::on_reset(const EventKind& kind, ResetCause cause, Dur
   boot_loop = false;
   if (&kind != &internal::kKill) schedule_boot(loop_.now() + boot_delay, cause);
   if (&kind == &internal::kPowerCycle) {
+    memory->files.lose_power();
     if (!options.clock_keeps_power) clock.set_offset(-Duration(to_ns(loop_.now())));
     if (hooks_.on_power_cycle) hooks_.on_power_cycle();
   }

@@ -31,6 +31,13 @@ enum class HostServices : std::uint8_t {
   kHost,     // as outside of a simulation: no two runs are the same
 };
 
+/// What flight code finds at a path that is none of FlightProcessOptions::files.
+enum class OtherFiles : std::uint8_t {
+  kRefuse,  // the call ends the process, by name; under AddressSanitizer as kHost
+  kAbsent,  // nothing is there, and nothing can be made there
+  kHost,    // the host's file: no two runs need be the same
+};
+
 struct FlightProcessOptions {
   std::string spacecraft;       // "dsc"; goes into file names, so no '/'
   std::string process = "gnc";  // likewise
@@ -41,8 +48,12 @@ struct FlightProcessOptions {
   int heap_alignment = 16;                // 16 (the host's ABI) or 8 (the paper's)
   HeapRules heap = {};                    // policy, checks
   HeapExhaustion heap_exhaustion = HeapExhaustion::kNull;
-  std::uint64_t storage_bytes = 1'048'576;  // non-volatile, all slots together
-  std::uint64_t stack_bytes = 1'048'576;    // 64 KiB ... 32 MiB; see FlightStack::available()
+  std::uint64_t storage_bytes = 1'048'576;        // non-volatile, all slots together
+  std::map<std::string, std::string> files = {};  // see FlightFiles
+  OtherFiles other_files = OtherFiles::kRefuse;
+  std::uint64_t file_bytes = 64'000'000;   // capacity, all files together
+  bool power_loss_takes_unsynced = false;  // what was written to files since the last fsync
+  std::uint64_t stack_bytes = 1'048'576;   // 64 KiB ... 32 MiB; see FlightStack::available()
   /// Edges of control flow that one call may take, counted by a library that was built with
   /// COUNT_WORK; 0: any number. Past it the process ends, at the same instruction in every run.
   std::uint64_t work_budget = 0;

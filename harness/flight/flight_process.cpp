@@ -47,9 +47,18 @@ HeapOptions heap_options(const FlightProcessOptions& options) {
           .rules = options.heap};
 }
 
+std::shared_ptr<NonVolatileMemory> fresh_memory(const FlightProcessOptions& options) {
+  return std::make_shared<NonVolatileMemory>(
+      options.storage_bytes,
+      FlightFiles(options.files, options.file_bytes, options.power_loss_takes_unsynced));
+}
+
 }  // namespace
 
-FlightProcess::Impl::Impl(FlightProcessOptions o) : options(std::move(o)) {
+FlightProcess::Impl::Impl(FlightProcessOptions o, std::shared_ptr<NonVolatileMemory> earlier)
+    : options(std::move(o)),
+      memory(earlier != nullptr ? std::move(earlier) : fresh_memory(options)),
+      files(options, memory, services) {
   check_name("spacecraft", options.spacecraft);
   check_name("process", options.process);
   // Also where heaps are not simulated: a mistake must not show under one preset only.
@@ -58,6 +67,7 @@ FlightProcess::Impl::Impl(FlightProcessOptions o) : options(std::move(o)) {
   name = process_name(options);
   contained_.name = name.c_str();
   contained_.services = &services;
+  contained_.files = &files;
   if (internal::call_in_progress()) {
     throw std::logic_error("FlightProcess: loaded from within a call of flight code");
   }
@@ -132,7 +142,7 @@ FlightProcess::Impl::~Impl() {
 bool FlightProcess::Impl::shut_down_library() {
   alive = false;
   ended = true;
-  return internal::run_contained(
+  const bool returned = internal::run_contained(
       contained_,
       [](void* argument) {
         Impl& self = *static_cast<Impl*>(argument);
@@ -143,8 +153,11 @@ bool FlightProcess::Impl::shut_down_library() {
           last.function(last.argument);
         }
         self.library->run_destructors();
+        self.files.flush();
       },
       this, capture_);
+  files.close_all();
+  return returned;
 }
 
 // ---- calls
@@ -297,6 +310,7 @@ void FlightProcess::Impl::cut_off() {
   outputs.clear();
   tick_request.reset();
   contained_.exit_functions.clear();
+  files.close_all();
   if (heap != nullptr) heap->drop();
 }
 
@@ -415,8 +429,9 @@ void FlightProcess::Impl::on_heap_fault(void* self, const HeapFault& fault) {
 
 // ---- the public face
 
-FlightProcess::FlightProcess(FlightProcessOptions options)
-    : impl_(std::make_unique<Impl>(std::move(options))) {}
+FlightProcess::FlightProcess(FlightProcessOptions options,
+                             std::shared_ptr<NonVolatileMemory> memory)
+    : impl_(std::make_unique<Impl>(std::move(options), std::move(memory))) {}
 
 FlightProcess::~FlightProcess() {
   if (impl_->alive) shut_down(impl_->record.t, 0);
@@ -534,11 +549,8 @@ std::string to_string(const LeakReport& leak) {
          to_string(leak.allocated_by);
 }
 
-const FlightProcess::Storage& FlightProcess::storage() const {
-  return impl_->storage;
-}
-void FlightProcess::set_storage(Storage storage) {
-  impl_->storage = std::move(storage);
+const std::shared_ptr<NonVolatileMemory>& FlightProcess::memory() const {
+  return impl_->memory;
 }
 const std::vector<std::string>& FlightProcess::edited_symbols() const {
   return impl_->library->edited_symbols();

@@ -4,6 +4,7 @@
 
 #include <orrery/harness/flight/crash_report.hpp>
 #include <orrery/harness/flight/flight_options.hpp>
+#include <orrery/harness/flight/non_volatile_memory.hpp>
 #include <orrery/harness/heap/heap_figures.hpp>
 #include <orrery/harness/heap/heap_history.hpp>
 #include <orrery/harness/kernel/bytes.hpp>
@@ -70,7 +71,9 @@ class FlightProcess {
   /// @throws std::invalid_argument  the library is missing, does not load, crashes while it does,
   ///                                or breaks the ABI; an option outside its range. The message
   ///                                says which and why.
-  explicit FlightProcess(FlightProcessOptions options);
+  /// @param memory  Of an earlier process; null: fresh, with the files of the options.
+  explicit FlightProcess(FlightProcessOptions options,
+                         std::shared_ptr<NonVolatileMemory> memory = nullptr);
   ~FlightProcess();  // as shut_down(), if still alive
   FlightProcess(const FlightProcess&) = delete;
   FlightProcess& operator=(const FlightProcess&) = delete;
@@ -135,10 +138,8 @@ class FlightProcess {
   /// Blocks allocated after one HeapWatch::mark() up to another that are live now, by call stack.
   /// @throws std::logic_error  HeapRules::track_sites is off.
   std::vector<LeakReport> leaks(std::uint64_t after, std::uint64_t until) const;
-  /// Non-volatile storage; it outlives crash and shut-down, and may be handed to the next process.
-  using Storage = std::vector<std::pair<std::uint32_t, ByteBuffer>>;  // by slot number, ascending
-  const Storage& storage() const;
-  void set_storage(Storage storage);
+  /// It outlives crash and shut-down, and may be handed to the next process.
+  const std::shared_ptr<NonVolatileMemory>& memory() const;
 
   /// Symbols of the library that would have been one for all its copies, and were made one per
   /// copy.

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <orrery/harness/flight/containment.hpp>
+#include <orrery/harness/flight/file_services.hpp>
 #include <orrery/harness/flight/flight_library.hpp>
 #include <orrery/harness/flight/flight_process.hpp>
 #include <orrery/harness/flight/globals_watch.hpp>
@@ -36,7 +37,7 @@ struct CallArguments {
 
 class FlightProcess::Impl {
  public:
-  explicit Impl(FlightProcessOptions options);
+  Impl(FlightProcessOptions options, std::shared_ptr<NonVolatileMemory> memory);
   ~Impl();
 
   CallOutcome call(internal::CallArguments arguments, SimTime truth, Bytes data);
@@ -65,9 +66,11 @@ class FlightProcess::Impl {
   const orrery_flight* flight = nullptr;
   std::unique_ptr<SimulatedHeap> heap;           // null where heaps are not simulated
   std::unique_ptr<internal::FlightStack> stack;  // null: calls run on the caller's
-  std::unique_ptr<FlightLibrary> library;        // unloaded while heap and stack are still there
   internal::VirtualServices services{options};
-  orrery_work* work = nullptr;  // of the library; null: it counts none
+  std::shared_ptr<NonVolatileMemory> memory;
+  internal::FileServices files;
+  std::unique_ptr<FlightLibrary> library;  // unloaded while all of the above is still there
+  orrery_work* work = nullptr;             // of the library; null: it counts none
 
   std::optional<internal::GlobalsWatch> globals;  // Isolation::kShared
   std::string written_global;
@@ -79,7 +82,6 @@ class FlightProcess::Impl {
   CallRecord record;
   CrashReport crash;
   std::optional<std::int64_t> tick_request;
-  Storage storage;
   internal::HostStopwatch stopwatch;
 
   struct OutputRow {

@@ -2,6 +2,7 @@
 // flight code; the rest is simulator code under SimulatorScope. A crash may leave these functions
 // between any two lines.
 
+#include <orrery/harness/flight/flight_memory.hpp>
 #include <orrery/harness/flight/flight_process_impl.hpp>
 
 #include <algorithm>
@@ -9,18 +10,9 @@
 
 namespace orrery {
 
+using internal::copy_between;
 using internal::SimulatorScope;
 using Call = internal::LibraryCall;
-
-namespace {
-
-// What flight code points to may be anything, null included; then this faults, as flight code.
-__attribute__((noinline, no_sanitize("undefined"))) void copy_between(void* to, const void* from,
-                                                                      std::size_t bytes) {
-  if (bytes > 0) std::memcpy(to, from, bytes);
-}
-
-}  // namespace
 
 void FlightProcess::Impl::fill_host_table() {
   host_.size = sizeof host_;
@@ -91,36 +83,24 @@ void FlightProcess::Impl::log(std::int32_t level, const char* line) {
 std::int32_t FlightProcess::Impl::load_slot(std::uint32_t slot, void* buffer,
                                             std::uint32_t capacity) {
   if (!calling()) return ORRERY_REJECTED;
-  for (const auto& [number, content] : storage) {
-    if (number != slot) continue;
-    if (content.size() > capacity) return ORRERY_TOO_SMALL;
-    copy_between(buffer, content.data(), content.size());
-    return static_cast<std::int32_t>(content.size());
-  }
-  return ORRERY_NOT_FOUND;
+  const ByteBuffer* content = memory->slot(slot);
+  if (content == nullptr) return ORRERY_NOT_FOUND;
+  if (content->size() > capacity) return ORRERY_TOO_SMALL;
+  copy_between(buffer, content->data(), content->size());
+  return static_cast<std::int32_t>(content->size());
 }
 
 std::int32_t FlightProcess::Impl::store_slot(std::uint32_t slot, const void* data,
                                              std::uint32_t bytes) {
   if (!calling()) return ORRERY_REJECTED;
-  std::uint64_t others = 0;
-  for (const auto& [number, content] : storage) others += number == slot ? 0 : content.size();
-  if (others + bytes > options.storage_bytes) return ORRERY_TOO_SMALL;
+  if (bytes > options.storage_bytes) return ORRERY_TOO_SMALL;
   {
     const SimulatorScope scope;
     staging_.resize(bytes);
   }
   copy_between(staging_.data(), data, bytes);
   const SimulatorScope scope;
-  const auto place = std::lower_bound(
-      storage.begin(), storage.end(), slot,
-      [](const auto& entry, std::uint32_t number) { return entry.first < number; });
-  if (place != storage.end() && place->first == slot) {
-    place->second = staging_;
-  } else {
-    storage.insert(place, {slot, staging_});
-  }
-  return ORRERY_OK;
+  return memory->store(slot, staging_) ? ORRERY_OK : ORRERY_TOO_SMALL;
 }
 
 }  // namespace orrery

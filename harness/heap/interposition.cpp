@@ -19,6 +19,7 @@ extern "C" [[gnu::weak]] bool orrery_allocator_simulates();
 extern "C" [[gnu::weak]] const char* orrery_allocator_hook_not_taken(std::size_t index);
 extern "C" [[gnu::weak]] bool orrery_services_are_virtual();
 extern "C" [[gnu::weak]] const char* orrery_service_hook_not_taken(std::size_t index);
+extern "C" [[gnu::weak]] const char* orrery_file_hook_not_taken(std::size_t index);
 
 namespace orrery {
 namespace internal {
@@ -27,6 +28,7 @@ constinit std::uintptr_t loader_begin = 0;
 constinit std::uintptr_t loader_bytes = 0;
 constinit const ProcessHooks* process_hooks = nullptr;
 constinit const ServiceHooks* service_hooks = nullptr;
+constinit FileViewFunction* file_view = nullptr;
 
 }  // namespace internal
 
@@ -76,6 +78,10 @@ bool services_are_virtual() {
   return orrery_services_are_virtual != nullptr && orrery_services_are_virtual();
 }
 
+bool files_are_virtual() {
+  return orrery_file_hook_not_taken != nullptr;
+}
+
 void warm_up_libraries() {
   static std::once_flag once;
   std::call_once(once, [] {
@@ -96,6 +102,7 @@ std::string verify_interposition() {
   };
   if (heap_simulation_available()) ask(orrery_allocator_hook_not_taken);
   if (services_are_virtual()) ask(orrery_service_hook_not_taken);
+  if (files_are_virtual()) ask(orrery_file_hook_not_taken);
   if (names.empty()) return "";
   return "these functions of the simulated heap are not reached by shared libraries: " + names +
          "; link the test program with orrery::allocator, whose --dynamic-list exports them";

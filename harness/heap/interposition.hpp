@@ -5,8 +5,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <ctime>
+#include <dirent.h>
+#include <optional>
 #include <string>
+#include <sys/stat.h>
 
 namespace orrery {
 
@@ -22,6 +26,9 @@ std::string verify_interposition();
 /// True where time, chance and threads of flight code are answered by us: not under a sanitizer
 /// that owns these functions.
 bool services_are_virtual();
+
+/// True where files of flight code can be ours: the program links orrery::allocator.
+bool files_are_virtual();
 
 namespace internal {
 
@@ -52,6 +59,45 @@ struct ServiceHooks {
   bool (*start_thread)(const char* function);
 };
 extern const ServiceHooks* service_hooks;
+
+/// Files as flight code finds them in place of the host's. A result is that of the system call, or
+/// minus errno; without a value it is the host's matter. `function` is what was called, `folder` a
+/// descriptor as for openat().
+class FileView {
+ public:
+  using Result = std::optional<long>;
+  virtual ~FileView() = default;
+  virtual Result open(const char* function, int folder, const char* path, int flags) = 0;
+  virtual Result close(int fd) = 0;
+  virtual Result read(int fd, void* to, std::size_t bytes) = 0;
+  virtual Result write(int fd, const void* from, std::size_t bytes) = 0;
+  virtual Result read_at(int fd, void* to, std::size_t bytes, std::int64_t offset) = 0;
+  virtual Result write_at(int fd, const void* from, std::size_t bytes, std::int64_t offset) = 0;
+  virtual Result seek(int fd, std::int64_t offset, int whence) = 0;
+  virtual Result sync(int fd) = 0;
+  virtual Result resize(int fd, std::int64_t bytes) = 0;
+  virtual Result resize(const char* function, const char* path, std::int64_t bytes) = 0;
+  virtual Result status(int fd, struct stat* to) = 0;
+  virtual Result status(const char* function, int folder, const char* path, struct stat* to) = 0;
+  virtual Result access(const char* function, int folder, const char* path) = 0;
+  enum class Kind : std::uint8_t { kFile, kFolder, kEither };
+  virtual Result remove(const char* function, int folder, const char* path, Kind kind) = 0;
+  virtual Result rename(const char* function, const char* from, const char* to) = 0;
+  virtual Result make_folder(const char* function, int folder, const char* path) = 0;
+  /// fopen and fdopen: 0 and the stream, or minus errno.
+  virtual Result open_stream(const char* function, const char* path, const char* mode,
+                             FILE*& stream) = 0;
+  virtual Result open_stream(int fd, const char* mode, FILE*& stream) = 0;
+  virtual Result descriptor_of(FILE* stream) = 0;
+  /// opendir and fdopendir.
+  virtual Result open_folder(const char* function, const char* path, DIR*& folder) = 0;
+  virtual Result open_folder(int fd, DIR*& folder) = 0;
+  virtual Result read_folder(DIR* folder, dirent*& entry) = 0;  // null: no more
+  virtual Result close_folder(DIR* folder) = 0;
+};
+/// Set once by harness/flight: of the flight code that is running, or null.
+using FileViewFunction = FileView*();
+extern FileViewFunction* file_view;
 
 }  // namespace internal
 }  // namespace orrery

@@ -116,7 +116,7 @@ TEST_F(FlightProcessTest, LogLinesArriveWithTheirLevel) {
 TEST_F(FlightProcessTest, StorageOutlivesTheProcess) {
   FlightProcessOptions o = options();
   o.storage_bytes = 8;
-  FlightProcess::Storage storage;
+  std::shared_ptr<NonVolatileMemory> memory;
   {
     const auto process = created(o);
     EXPECT_EQ(tell(*process, order("y\1")), CallOutcome::kRejected);  // no such slot
@@ -126,10 +126,9 @@ TEST_F(FlightProcessTest, StorageOutlivesTheProcess) {
     EXPECT_EQ(tell(*process, order("w\1xyz")), CallOutcome::kDone);         // replaces 3 by 3
     tell(*process, order("!s"));
     EXPECT_FALSE(process->alive());
-    storage = process->storage();
+    memory = process->memory();
   }
-  FlightProcess next(o);
-  next.set_storage(storage);
+  FlightProcess next(o, memory);
   next.create(kTruth, 0, 1, ResetCause::kCrash);
   tell(next, order("y\1"));
   EXPECT_THAT(said(next), ElementsAre("xyz"));

@@ -1,0 +1,102 @@
+/// Open files of one flight process: what open, read, fopen and their kin do for it.
+#pragma once
+
+#include <orrery/harness/flight/flight_options.hpp>
+#include <orrery/harness/flight/non_volatile_memory.hpp>
+#include <orrery/harness/flight/virtual_services.hpp>
+#include <orrery/harness/heap/interposition.hpp>
+
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace orrery::internal {
+
+/// Of one life of a process.
+///
+/// Numbers   Descriptors are 512 to 1023, the lowest free one first, so that none is the host's;
+///           these go to the C library. Paths are seen from "/".
+/// Streams   A FILE and its buffer are the C library's, on no simulated heap. What a stream had not
+///           written when its process crashed is lost with it.
+/// Calls     All functions of FileView are called as flight code, and by nobody else.
+class FileServices final : public FileView {
+ public:
+  FileServices(const FlightProcessOptions& options, std::shared_ptr<NonVolatileMemory> memory,
+               const VirtualServices& clock);
+  ~FileServices() override;
+
+  /// Orderly end, as flight code: what streams hold is written, as exit() does.
+  void flush();
+  /// The end, as simulator code: everything is closed, nothing written.
+  void close_all();
+
+  Result open(const char* function, int folder, const char* path, int flags) override;
+  Result close(int fd) override;
+  Result read(int fd, void* to, std::size_t bytes) override;
+  Result write(int fd, const void* from, std::size_t bytes) override;
+  Result read_at(int fd, void* to, std::size_t bytes, std::int64_t offset) override;
+  Result write_at(int fd, const void* from, std::size_t bytes, std::int64_t offset) override;
+  Result seek(int fd, std::int64_t offset, int whence) override;
+  Result sync(int fd) override;
+  Result resize(int fd, std::int64_t bytes) override;
+  Result resize(const char* function, const char* path, std::int64_t bytes) override;
+  Result status(int fd, struct stat* to) override;
+  Result status(const char* function, int folder, const char* path, struct stat* to) override;
+  Result access(const char* function, int folder, const char* path) override;
+  Result remove(const char* function, int folder, const char* path, Kind kind) override;
+  Result rename(const char* function, const char* from, const char* to) override;
+  Result make_folder(const char* function, int folder, const char* path) override;
+  Result open_stream(const char* function, const char* path, const char* mode,
+                     FILE*& stream) override;
+  Result open_stream(int fd, const char* mode, FILE*& stream) override;
+  Result descriptor_of(FILE* stream) override;
+  Result open_folder(const char* function, const char* path, DIR*& folder) override;
+  Result open_folder(int fd, DIR*& folder) override;
+  Result read_folder(DIR* folder, dirent*& entry) override;
+  Result close_folder(DIR* folder) override;
+
+ private:
+  struct Stream;
+  struct OpenFile {
+    FlightFiles::NodePointer node = nullptr;
+    std::string path = {};
+    int flags = 0;
+    std::uint64_t offset = 0;
+    std::shared_ptr<Stream> stream = nullptr;
+    // Of a folder.
+    std::vector<std::string> names = {};
+    std::size_t next_name = 0;
+    dirent entry = {};
+
+    bool readable() const;
+    bool writable() const;
+  };
+  enum class Place : std::uint8_t { kOurs, kHost, kAbsent, kRefused };
+
+  Place place_of(int folder, const char* text, std::string& path) const;
+  template <class Action>
+  Result at_path(const char* function, int folder, const char* path, Action action);
+  long open_node(const std::string& path, int flags);
+  long describe(const FlightFiles::Node& node, struct stat* to) const;
+  long write_staged(OpenFile& file, std::uint64_t at);
+  Result read_from(int fd, void* to, std::size_t bytes, std::int64_t offset);
+  Result write_to(int fd, const void* from, std::size_t bytes, std::int64_t offset);
+  long make_stream(int fd, const char* mode, FILE*& stream);
+  OpenFile* find(int fd);
+  OpenFile* find_folder(DIR* folder, int* fd = nullptr);
+  FlightFiles& files() { return memory_->files; }
+
+  const FlightProcessOptions& options_;
+  std::shared_ptr<NonVolatileMemory> memory_;
+  const VirtualServices& clock_;
+  std::map<int, OpenFile> open_;
+  std::vector<std::shared_ptr<Stream>> orphans_;  // their descriptors were closed under them
+  ByteBuffer staging_;  // what is written: a copy, for reading it may fault
+};
+
+/// Makes the interposed functions of this program (file_hooks.cpp of harness/heap) come here.
+void install_file_view();
+
+}  // namespace orrery::internal

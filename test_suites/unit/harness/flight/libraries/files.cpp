@@ -1,0 +1,187 @@
+// Uses files in every way that flight code does: "<verb> <path> <text>" on "do", one line back on
+// "answers": what was read, or "errno" and its name where a function failed.
+#include <cerrno>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <dirent.h>
+#include <fcntl.h>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "orrery_flight.hpp"
+
+namespace {
+
+using orrery_abi::Bytes;
+using orrery_abi::Host;
+using orrery_abi::Port;
+
+std::string failed() {
+  return std::string("errno ") + strerrorname_np(errno);
+}
+
+std::string write_descriptor(const std::string& path, const std::string& text, int flags) {
+  const int fd = open(path.c_str(), flags, 0644);
+  if (fd < 0) return failed();
+  const ssize_t written = write(fd, text.data(), text.size());
+  const std::string result = written < 0 ? failed() : std::to_string(written);
+  return close(fd) == 0 ? result : failed();
+}
+
+// Backwards, so that seeking shows.
+std::string read_descriptor(const std::string& path) {
+  const int fd = open(path.c_str(), O_RDONLY);
+  if (fd < 0) return failed();
+  const off_t size = lseek(fd, 0, SEEK_END);
+  std::string text;
+  for (off_t at = size; at-- > 0;) {
+    char c = 0;
+    if (pread(fd, &c, 1, at) != 1) return failed();
+    text += c;
+  }
+  close(fd);
+  return text;
+}
+
+std::string read_stdio(const std::string& path) {
+  FILE* file = std::fopen(path.c_str(), "r");
+  if (file == nullptr) return failed();
+  char line[64] = "";
+  std::string text;
+  while (std::fgets(line, sizeof line, file) != nullptr) text += line;
+  std::rewind(file);
+  int number = -1;
+  if (std::fscanf(file, "%d", &number) == 1) text += "|" + std::to_string(number);
+  std::fseek(file, 0, SEEK_END);
+  text += "|" + std::to_string(std::ftell(file)) + "|" + std::to_string(fileno(file) >= 512);
+  std::fclose(file);
+  return text;
+}
+
+std::string read_stream(const std::string& path) {
+  std::ifstream file(path);
+  if (!file) return failed();
+  std::string text, line;
+  while (std::getline(file, line)) text += line + ";";
+  file.clear();
+  file.seekg(2);
+  text += static_cast<char>(file.get());
+  file.seekg(0, std::ios::end);
+  return text + std::to_string(file.tellg());
+}
+
+std::string list(const std::string& path) {
+  DIR* folder = opendir(path.c_str());
+  if (folder == nullptr) return failed();
+  std::string names;
+  while (const dirent* entry = readdir(folder)) {
+    names += std::string(entry->d_name) + (entry->d_type == DT_DIR ? "/ " : " ");
+  }
+  closedir(folder);
+  return names;
+}
+
+std::string sizes(const std::string& path) {
+  struct stat status {};
+  if (stat(path.c_str(), &status) != 0) return failed();
+  return (S_ISDIR(status.st_mode) ? "folder " : "file ") + std::to_string(status.st_size) + " " +
+         std::to_string(status.st_mtime);
+}
+
+std::string walk(const std::string& path) {
+  std::string names;
+  for (const auto& entry : std::filesystem::directory_iterator(path)) {
+    names += entry.path().string() + (entry.is_directory() ? "/ " : " ");
+  }
+  return names;
+}
+
+std::string done(int result) {
+  return result == 0 ? "done" : failed();
+}
+
+FILE* left_open = nullptr;
+const char* volatile nowhere = nullptr;  // so that the compiler does not see it
+
+std::string perform(const std::string& verb, const std::string& path, const std::string& text) {
+  const char* p = path.c_str();
+  if (verb == "write") return write_descriptor(path, text, O_WRONLY | O_CREAT | O_TRUNC);
+  if (verb == "append") return write_descriptor(path, text, O_WRONLY | O_APPEND);
+  if (verb == "create") return write_descriptor(path, text, O_WRONLY | O_CREAT | O_EXCL);
+  if (verb == "read") return read_descriptor(path);
+  if (verb == "fopen") return read_stdio(path);
+  if (verb == "ifstream") return read_stream(path);
+  if (verb == "ofstream") {
+    std::ofstream file(path, std::ios::app);
+    file << text << 42 << '\n';
+    file.close();
+    return file ? "done" : failed();
+  }
+  if (verb == "fprintf") {
+    FILE* file = std::fopen(p, "w");
+    if (file == nullptr) return failed();
+    std::fprintf(file, "%s\n", text.c_str());
+    return done(std::fclose(file));
+  }
+  if (verb == "leave") {  // in the buffer, for as long as the process lives
+    left_open = std::fopen(p, "a");
+    std::fputs(text.c_str(), left_open);
+    return "done";
+  }
+  if (verb == "flush") return done(std::fflush(left_open));
+  if (verb == "sync") return done(fsync(fileno(left_open)));
+  if (verb == "close_under") {
+    FILE* file = std::fopen(p, "w");
+    std::fputs(text.c_str(), file);
+    close(fileno(file));
+    return done(std::fclose(file));
+  }
+  if (verb == "stat") return sizes(path);
+  if (verb == "list") return list(path);
+  if (verb == "walk") return walk(path);
+  if (verb == "mkdir") return done(mkdir(p, 0755));
+  if (verb == "rmdir") return done(rmdir(p));
+  if (verb == "unlink") return done(unlink(p));
+  if (verb == "rename") return done(std::rename(p, text.c_str()));
+  if (verb == "truncate") return done(truncate(p, 3));
+  if (verb == "exists") return std::filesystem::exists(path) ? "yes" : "no";
+  if (verb == "null") return std::to_string(open(nowhere, O_RDONLY));
+  if (verb == "many") {
+    int opened = 0;
+    while (open(p, O_RDONLY) >= 0) ++opened;
+    return std::to_string(opened) + " " + failed();
+  }
+  return "no such verb";
+}
+
+class Files {
+ public:
+  Files(Host host, const orrery_boot&) : host_(host) {}
+  std::int32_t order(std::int64_t, Bytes message) {
+    const std::string all(static_cast<const char*>(message.data), message.size);
+    const std::size_t first = all.find(' ');
+    const std::size_t second = std::min(all.find(' ', first + 1), all.size());
+    const std::string text = second < all.size() ? all.substr(second + 1) : "";
+    const std::string answer =
+        perform(all.substr(0, first), all.substr(first + 1, second - first - 1), text);
+    host_.output(2, {answer.data(), static_cast<std::uint32_t>(answer.size())});
+    return ORRERY_OK;
+  }
+  std::int32_t tick(std::int64_t) { return ORRERY_OK; }
+  static const Port<Files> (&ports())[2] {
+    static const Port<Files> table[2] = {{1, ORRERY_IN, ORRERY_PACKET, "do", 1024, &Files::order},
+                                         {2, ORRERY_OUT, ORRERY_PACKET, "answers", 1024, nullptr}};
+    return table;
+  }
+
+ private:
+  Host host_;
+};
+
+}  // namespace
+
+ORRERY_FLIGHT_LIBRARY(Files, "files", "1.0")
