@@ -32,11 +32,11 @@ class AccountingHeap final : public BlockHeap {
   }
 
   // Nobody allocates from here.
-  void* allocate(std::size_t) override { std::abort(); }
-  void* allocate_zeroed(std::size_t, std::size_t) override { std::abort(); }
-  void* allocate_aligned(std::size_t, std::size_t) override { std::abort(); }
-  void* reallocate(void*, std::size_t) override { std::abort(); }
-  void release(void*) override { std::abort(); }
+  void* allocate(std::size_t) noexcept override { std::abort(); }
+  void* allocate_zeroed(std::size_t, std::size_t) noexcept override { std::abort(); }
+  void* allocate_aligned(std::size_t, std::size_t) noexcept override { std::abort(); }
+  void* reallocate(void*, std::size_t) noexcept override { std::abort(); }
+  void release(void*) noexcept override { std::abort(); }
   std::uint64_t largest_free_bytes() const override { return 0; }
   std::uint64_t free_list_length() const override { return 0; }
   bool check() override { return true; }

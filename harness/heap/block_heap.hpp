@@ -19,7 +19,9 @@ using HeapOffset = std::uint32_t;  // from the arena's first byte to a payload; 
 
 /// The arena of a heap and the extent of its blocks; what the lists of free blocks see of it.
 struct HeapArea {
-  using Word [[gnu::may_alias]] = std::uint32_t;  // lies where user data of other types did
+  // These lie where user data of other types did.
+  using Word [[gnu::may_alias]] = std::uint32_t;
+  using Link [[gnu::may_alias]] = std::uint64_t;
   static constexpr std::uint32_t kLive = 1;
   static constexpr HeapOffset kBad = 1;  // no payload lies there
 
@@ -30,6 +32,8 @@ struct HeapArea {
 
   std::byte* at(HeapOffset offset) const { return arena + offset; }
   Word& word(HeapOffset offset) const { return *reinterpret_cast<Word*>(arena + offset); }
+  /// A free block's first 8 payload bytes, which belong to the list of free blocks.
+  Link& link(HeapOffset payload) const { return *reinterpret_cast<Link*>(arena + payload); }
   Word& header(HeapOffset payload) const { return word(payload - 4); }
   Word& footer(HeapOffset payload, std::uint32_t size) const { return word(payload + size - 8); }
   std::uint32_t size(HeapOffset payload) const { return header(payload) & ~kLive; }
@@ -89,13 +93,14 @@ class BlockHeap {
   void set_limit(std::uint64_t bytes);
   const HeapOptions& options() const { return options_; }
 
-  /// Null past the limit. malloc(0) is a block of its own.
-  virtual void* allocate(std::size_t bytes) = 0;
-  virtual void* allocate_zeroed(std::size_t count, std::size_t bytes) = 0;
+  // noexcept, as malloc is: a handler may jump, but not throw.
+  /// Null, and errno ENOMEM, past the limit. malloc(0) is a block of its own.
+  virtual void* allocate(std::size_t bytes) noexcept = 0;
+  virtual void* allocate_zeroed(std::size_t count, std::size_t bytes) noexcept = 0;
   /// @param alignment  a power of two; null if it is none.
-  virtual void* allocate_aligned(std::size_t alignment, std::size_t bytes) = 0;
-  virtual void* reallocate(void* payload, std::size_t bytes) = 0;
-  virtual void release(void* payload) = 0;  // null: nothing
+  virtual void* allocate_aligned(std::size_t alignment, std::size_t bytes) noexcept = 0;
+  virtual void* reallocate(void* payload, std::size_t bytes) noexcept = 0;
+  virtual void release(void* payload) noexcept = 0;  // null: nothing
   /// Bytes that may be written; 0 for null.
   std::size_t usable_bytes(void* payload);
 

@@ -69,7 +69,6 @@ class BestFitLists {
     remove(block, found);
     insert(rest, size);
   }
-  bool rename_front(HeapOffset, HeapOffset, std::uint32_t) { return false; }
   void remove(HeapOffset block, std::uint32_t size) { lists_.unlink(block, two_level_class(size)); }
   void take(HeapOffset block, std::uint32_t size) { remove(block, size); }
   void replace(HeapOffset old, HeapOffset now, std::uint32_t size);
@@ -102,7 +101,6 @@ class NewlibBins {
   void insert(HeapOffset block, std::uint32_t size, bool at_top);
   void split(HeapOffset block, std::uint32_t found, HeapOffset rest, std::uint32_t size,
              bool at_top);
-  bool rename_front(HeapOffset, HeapOffset, std::uint32_t) { return false; }
   void remove(HeapOffset block, std::uint32_t size);
   void take(HeapOffset block, std::uint32_t size);
   void replace(HeapOffset old, HeapOffset now, std::uint32_t size);

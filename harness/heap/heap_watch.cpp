@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstring>
 
 namespace orrery {
@@ -42,6 +43,7 @@ bool HeapWatch::refuses() {
   ++requests_;
   if (!refuse_ || !refuse_(requests_)) return false;
   ++refused_;
+  errno = ENOMEM;
   return true;
 }
 

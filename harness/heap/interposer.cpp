@@ -35,11 +35,11 @@ extern "C" bool orrery_allocator_simulates() {
 #define ORRERY_HOOK extern "C" [[gnu::visibility("default")]]
 
 // The C library's own, under names that are not interposed.
-extern "C" void* __libc_malloc(std::size_t);
-extern "C" void __libc_free(void*);
-extern "C" void* __libc_calloc(std::size_t, std::size_t);
-extern "C" void* __libc_realloc(void*, std::size_t);
-extern "C" void* __libc_memalign(std::size_t, std::size_t);
+extern "C" void* __libc_malloc(std::size_t) noexcept;
+extern "C" void __libc_free(void*) noexcept;
+extern "C" void* __libc_calloc(std::size_t, std::size_t) noexcept;
+extern "C" void* __libc_realloc(void*, std::size_t) noexcept;
+extern "C" void* __libc_memalign(std::size_t, std::size_t) noexcept;
 
 extern "C" bool orrery_allocator_simulates();
 extern "C" const char* orrery_allocator_hook_not_taken(std::size_t index);
@@ -52,7 +52,7 @@ using orrery::SimulatedHeap;
 // The heap to allocate from, or null for the system's.
 inline SimulatedHeap* heap_for(const void* caller) {
   SimulatedHeap* heap = orrery::current_heap;
-  if (__builtin_expect(heap == nullptr, 1)) return nullptr;
+  if (heap == nullptr) return nullptr;
   const std::uintptr_t in_loader =
       reinterpret_cast<std::uintptr_t>(caller) - orrery::internal::loader_begin;
   return in_loader < orrery::internal::loader_bytes ? nullptr : heap;
@@ -63,11 +63,12 @@ inline SimulatedHeap* heap_for(const void* caller) {
 inline SimulatedHeap* accountable_for(const void* payload) {
   SimulatedHeap* owner = SimulatedHeap::owner_of(payload);
   SimulatedHeap* current = orrery::current_heap;
+  if (__builtin_expect(owner == current, 1)) return owner;
   return owner == nullptr || current == nullptr || current->takes_others_blocks() ? owner : current;
 }
 
 inline void* or_no_memory(void* payload) {
-  if (payload == nullptr) errno = ENOMEM;
+  if (__builtin_expect(payload == nullptr, 0)) errno = ENOMEM;
   return payload;
 }
 
@@ -99,7 +100,7 @@ constexpr std::size_t kPage_bytes = 4096;
 
 ORRERY_HOOK void* malloc(std::size_t bytes) noexcept {
   SimulatedHeap* heap = heap_for(__builtin_return_address(0));
-  return heap == nullptr ? __libc_malloc(bytes) : or_no_memory(heap->allocate(bytes));
+  return heap == nullptr ? __libc_malloc(bytes) : heap->allocate(bytes);
 }
 
 ORRERY_HOOK void free(void* payload) noexcept {

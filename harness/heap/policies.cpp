@@ -1,6 +1,6 @@
 #include <orrery/harness/heap/address_list.hpp>
 #include <orrery/harness/heap/class_lists.hpp>
-#include <orrery/harness/heap/recency_list.hpp>
+#include <orrery/harness/heap/first_fit_heap.hpp>
 #include <orrery/harness/heap/scatter_list.hpp>
 #include <orrery/harness/heap/tagged_heap.hpp>
 
@@ -46,6 +46,10 @@ constexpr BlockRules kScatter = {.realloc_in_place = false};
 std::unique_ptr<BlockHeap> make_heap(void* arena, const HeapOptions& options) {
   switch (options.rules.policy) {
     case HeapPolicy::kFirstFit:
+      if (!options.rules.poison && !options.rules.remainder_keeps_place) {
+        return std::make_unique<internal::FirstFitHeap>(arena, options,
+                                                        papers_rules(options.rules));
+      }
       return heap_on<internal::RecencyList>(arena, options, papers_rules(options.rules));
     case HeapPolicy::kBestFit:
       return heap_on<internal::BestFitLists>(arena, options, papers_rules(options.rules));

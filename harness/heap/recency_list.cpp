@@ -8,96 +8,116 @@ std::uint32_t RecencyList::last_bucket(std::uint32_t g) const {
   return std::min(g * 64 + 63, (end_ - 1) / 64);
 }
 
-HeapOffset RecencyList::search(std::uint32_t size, std::uint64_t& steps) {
+std::uint32_t RecencyList::live_in_group(std::uint32_t g) const {
+  std::uint32_t live = 0;
+  for (std::uint32_t b = g * 64; b < g * 64 + 64; ++b) live += live_[b];
+  return live;
+}
+
+RecencyList::Slot RecencyList::search(std::uint32_t size, std::uint64_t& steps) {
   for (std::uint32_t g = (end_ - 1) / 4096 + 1; g-- > 0;) {
-    if (groups_[g].bound < size) {
-      steps += groups_[g].live;
+    if (group_bounds_[g] < size) {
+      steps += live_in_group(g);
       continue;
     }
-    const HeapOffset found = find_in_group(g, size, steps);
+    const Slot found = find_in_group(g, size, steps);
     if (found != 0) return found;
   }
   return 0;
 }
 
-HeapOffset RecencyList::find_in_group(std::uint32_t g, std::uint32_t size, std::uint64_t& steps) {
+RecencyList::Slot RecencyList::find_in_group(std::uint32_t g, std::uint32_t size,
+                                             std::uint64_t& steps) {
   std::uint32_t group_bound = 0;
-  const std::uint32_t first = g * 64;
-  for (std::uint32_t b = last_bucket(g) + 1; b-- > first;) {
-    Bucket& bucket = buckets_[b];
-    if (bucket.bound >= size) {
-      std::uint32_t bound = 0;
-      for (std::uint64_t left = bucket.live; left != 0;) {
-        const int i = 63 - std::countl_zero(left);
-        ++steps;
-        if (bucket.size[i] >= size) return bucket.block[i];
-        bound = std::max(bound, bucket.size[i]);
-        left &= ~(std::uint64_t{1} << i);
-      }
-      bucket.bound = bound;
-    } else {
-      steps += static_cast<std::uint64_t>(std::popcount(bucket.live));
+  for (std::uint32_t b = last_bucket(g) + 1; b-- > g * 64;) {
+    if (bounds_[b] < size) {
+      steps += live_[b];
+    } else if (const Slot found = find_in_bucket(b, size, steps); found != 0) {
+      return found;
     }
-    group_bound = std::max(group_bound, bucket.bound);
+    group_bound = std::max(group_bound, bounds_[b]);
   }
-  groups_[g].bound = group_bound;
+  group_bounds_[g] = group_bound;
   return 0;
+}
+
+RecencyList::Slot RecencyList::find_in_bucket(std::uint32_t b, std::uint32_t size,
+                                              std::uint64_t& steps) {
+  const std::uint64_t wanted = entry(0, size);
+  std::uint64_t most = 0;
+  for (Slot slot = std::min(b * 64 + 64, end_), first = std::max(b * 64, kFirst); slot-- > first;) {
+    const std::uint64_t e = entries_[slot];
+    steps += e != 0 ? 1 : 0;
+    if (e >= wanted) return slot;
+    most = std::max(most, e);
+  }
+  bounds_[b] = static_cast<std::uint32_t>(most >> 32);
+  return 0;
+}
+
+std::uint32_t RecencyList::bound_of_bucket(std::uint32_t b) const {
+  std::uint32_t bound = 0;
+  for (Slot slot = b * 64; slot < std::min(b * 64 + 64, end_); ++slot) {
+    bound = std::max(bound, size_of(slot));
+  }
+  return bound;
 }
 
 std::uint32_t RecencyList::largest() {
   std::uint32_t best = 0;
-  if (end_ == 0) return best;
   for (std::uint32_t g = (end_ - 1) / 4096 + 1; g-- > 0;) {
-    if (groups_[g].bound <= best) continue;
+    if (group_bounds_[g] <= best) continue;
     std::uint32_t group_bound = 0;
     for (std::uint32_t b = last_bucket(g) + 1; b-- > g * 64;) {
-      Bucket& bucket = buckets_[b];
-      if (bucket.bound > best) {
-        bucket.bound = 0;
-        for (std::uint64_t left = bucket.live; left != 0; left &= left - 1) {
-          bucket.bound = std::max(bucket.bound, bucket.size[std::countr_zero(left)]);
-        }
-        best = std::max(best, bucket.bound);
+      if (bounds_[b] > best) {
+        bounds_[b] = bound_of_bucket(b);
+        best = std::max(best, bounds_[b]);
       }
-      group_bound = std::max(group_bound, bucket.bound);
+      group_bound = std::max(group_bound, bounds_[b]);
     }
-    groups_[g].bound = group_bound;
+    group_bounds_[g] = group_bound;
   }
   return best;
 }
 
+void RecencyList::grow() {
+  entries_.grow(std::max<std::size_t>(2 * entries_.size(), 1));
+  capacity_ = static_cast<Slot>(entries_.size());
+  const std::size_t groups = (capacity_ + 4095) / 4096;
+  live_.grow(groups * 64);
+  bounds_.grow(groups * 64);
+  group_bounds_.grow(groups);
+}
+
 // More slots if most are in use; then what is left moves together, in order.
 void RecencyList::make_room() {
-  if (length_ * 2 >= capacity_) {
-    buckets_.grow(std::max<std::size_t>(2 * buckets_.size(), 1));
-    groups_.grow((buckets_.size() + 63) / 64);
-    capacity_ = static_cast<std::uint32_t>(buckets_.size() * 64);
-  }
-  const std::uint32_t old_end = end_;
-  end_ = 0;
-  for (std::uint32_t g = 0; g * 4096 < old_end; ++g) groups_[g] = {};
+  if (length_ * 2 >= capacity_) grow();
+  const Slot old_end = end_;
   for (std::uint32_t b = 0; b * 64 < old_end; ++b) {
-    const Bucket old = buckets_[b];  // a copy: its place is filled anew
-    buckets_[b].live = 0;
-    buckets_[b].bound = 0;
-    for (std::uint64_t left = old.live; left != 0; left &= left - 1) {
-      const int i = std::countr_zero(left);
-      put(end_++, old.block[i], old.size[i]);
-    }
+    live_[b] = 0;
+    bounds_[b] = group_bounds_[b / 64] = 0;
+  }
+  end_ = kFirst;
+  length_ = 0;
+  for (Slot slot = kFirst; slot < old_end; ++slot) {
+    const std::uint64_t e = entries_[slot];
+    entries_[slot] = 0;
+    if (e == 0) continue;
+    const HeapOffset block = static_cast<HeapOffset>(e);
+    area_.link(block) = push(block, static_cast<std::uint32_t>(e >> 32));
   }
 }
 
 HeapOffset RecencyList::check(std::uint64_t blocks) const {
   std::uint64_t counted = 0;
-  for (std::uint32_t b = 0; b * 64 < end_; ++b) {
-    const Bucket& bucket = buckets_[b];
-    for (std::uint64_t left = bucket.live; left != 0; left &= left - 1, ++counted) {
-      const int i = std::countr_zero(left);
-      const HeapOffset block = bucket.block[i];
-      if (!area_.within(block) || area_.header(block) != bucket.size[i] ||
-          !holds(block, bucket.size[i]) || bucket.size[i] > bucket.bound) {
-        return block;
-      }
+  for (Slot slot = kFirst; slot < end_; ++slot) {
+    if (entries_[slot] == 0) continue;
+    ++counted;
+    const HeapOffset block = block_of(slot);
+    const std::uint32_t size = size_of(slot);
+    if (!area_.within(block) || area_.header(block) != size || !holds(block, size) ||
+        size > bounds_[slot / 64] || size > group_bounds_[slot / 4096]) {
+      return block;
     }
   }
   return counted == blocks && counted == length_ ? 0 : HeapArea::kBad;

@@ -4,7 +4,6 @@
 #include <orrery/harness/heap/block_heap.hpp>
 #include <orrery/harness/heap/page_array.hpp>
 
-#include <bit>
 #include <cstdint>
 
 namespace orrery::internal {
@@ -23,74 +22,100 @@ namespace orrery::internal {
 class RecencyList {
  public:
   static constexpr bool kScatters = false;
+  using Slot = std::uint32_t;
 
-  RecencyList(const HeapArea& area, const HeapRules&) : area_(area) {}
+  RecencyList(const HeapArea& area, const HeapRules&) : area_(area) {
+    grow();
+    entries_[kFirst - 1] = kEdge;
+  }
 
   std::uint64_t length() const { return length_; }
 
   /// True if the block is in the list with that size.
   bool holds(HeapOffset block, std::uint32_t size) const {
-    const std::uint32_t slot = area_.word(block);
-    if (slot >= end_ || area_.word(block + 4) != ~slot) return false;
-    const Bucket& bucket = buckets_[slot / 64];
-    return bucket.block[slot % 64] == block && bucket.size[slot % 64] == size;
+    const Slot slot = area_.word(block);
+    return slot < end_ && entries_[slot] == entry(block, size) && area_.word(block + 4) == ~slot;
   }
 
   void insert(HeapOffset block, std::uint32_t size, bool /*at_top*/ = false) {
-    if (end_ == capacity_) make_room();
-    put(end_++, block, size);
-    ++length_;
+    if (full()) make_room();
+    area_.link(block) = push(block, size);
   }
-
-  void remove(HeapOffset block, std::uint32_t) {
-    const std::uint32_t slot = area_.word(block);
-    Bucket& bucket = buckets_[slot / 64];
-    const std::uint64_t live = bucket.live & ~(std::uint64_t{1} << (slot % 64));
-    bucket.live = live;
-    if (live == 0) bucket.bound = 0;
-    --groups_[slot / 4096].live;
-    --length_;
-    // What was in front leaves no gap: the usual malloc after free.
-    if (slot + 1 == end_) {
-      const std::uint32_t begin = slot & ~63u;
-      end_ = live == 0 ? begin : begin + 64 - static_cast<std::uint32_t>(std::countl_zero(live));
-    }
-  }
+  void remove(HeapOffset block, std::uint32_t) { remove(area_.word(block)); }
   void take(HeapOffset block, std::uint32_t size) { remove(block, size); }
 
   /// The block is taken, and its rest goes to the front.
   void split(HeapOffset block, std::uint32_t found, HeapOffset rest, std::uint32_t size,
              bool at_top) {
-    if (rename_front(block, rest, size)) return;
     remove(block, found);
     insert(rest, size, at_top);
   }
-  /// If `old` is in front, `now` takes its place there: what removing and inserting would come to.
-  bool rename_front(HeapOffset old, HeapOffset now, std::uint32_t size) {
-    const std::uint32_t slot = area_.word(old);
-    if (slot + 1 != end_) return false;
-    set(slot, now, size);
-    return true;
-  }
   /// `now`, a part of `old`, takes its place in the list.
   void replace(HeapOffset old, HeapOffset now, std::uint32_t size) {
-    set(area_.word(old), now, size);
+    const Slot slot = area_.word(old);
+    area_.link(now) = shrink(slot, now, size);
   }
 
   /// The first block of at least `size`; 0: none. Adds the blocks that a walk would have looked
   /// at, this one included.
   HeapOffset find(std::uint32_t size, std::uint64_t& steps) {
-    if (end_ == 0) return 0;
-    // The front, where most searches end.
-    const Bucket& bucket = buckets_[(end_ - 1) / 64];
-    if (bucket.live != 0) {
-      const int i = 63 - std::countl_zero(bucket.live);
-      if (bucket.size[i] >= size) {
-        ++steps;
-        return bucket.block[i];
-      }
+    return block_of(find_slot(size, steps));
+  }
+
+  // ---- by slots: what the calls above come to, and what FirstFitHeap calls
+
+  /// True: push() needs make_room() first, which renumbers the slots.
+  bool full() const { return end_ == capacity_; }
+  Slot end() const { return end_; }
+  /// What a slot holds: size and block in one word; 0 if it is empty.
+  std::uint64_t operator[](Slot slot) const { return entries_[slot]; }
+  HeapOffset block_of(Slot slot) const { return static_cast<HeapOffset>(entries_[slot]); }
+  std::uint32_t size_of(Slot slot) const {
+    return static_cast<std::uint32_t>(entries_[slot] >> 32);
+  }
+  static constexpr std::uint64_t entry(HeapOffset block, std::uint32_t size) {
+    return std::uint64_t{size} << 32 | block;
+  }
+  /// The first 8 payload bytes of a slot's block.
+  static constexpr std::uint64_t mark(Slot slot) { return std::uint64_t{~slot} << 32 | slot; }
+
+  /// Slot of the first block of at least `size`, else one that is empty.
+  Slot find_slot(std::uint32_t size, std::uint64_t& steps) {
+    // At the front, where most searches end.
+    const std::uint64_t wanted = entry(0, size);
+    const std::uint64_t* front = &entries_[end_ - 1];
+    if (*front >= wanted) {
+      ++steps;
+      return end_ - 1;
     }
-    return search(size, steps);
+    return *(front - 1) >= wanted ? (steps += 2, end_ - 2) : search(size, steps);
+  }
+
+  /// Puts the block in front: the mark that it must bear.
+  std::uint64_t push(HeapOffset block, std::uint32_t size) {
+    const Slot slot = end_;
+    entries_[slot] = entry(block, size);
+    ++live_[slot / 64];
+    if (__builtin_expect(bounds_[slot / 64] < size, 0)) raise_bound(slot / 64, size);
+    end_ = slot + 1;
+    ++length_;
+    return mark(slot);
+  }
+  /// Empties the slot.
+  void remove(Slot slot) {
+    entries_[slot] = 0;
+    --live_[slot / 64];
+    --length_;
+    // What was in front leaves no gap: the usual malloc after free.
+    if (slot + 1 == end_) {
+      while (entries_[slot - 1] == 0) --slot;
+      end_ = slot;
+    }
+  }
+  /// The slot holds a part of its block from here on: the mark that this must bear.
+  std::uint64_t shrink(Slot slot, HeapOffset part, std::uint32_t size) {
+    entries_[slot] = entry(part, size);
+    return mark(slot);
   }
 
   /// Size of the largest block.
@@ -100,41 +125,29 @@ class RecencyList {
   HeapOffset check(std::uint64_t blocks) const;
 
  private:
-  struct Bucket {
-    std::uint64_t live;  // bit i: slot i holds a block
-    std::uint32_t bound, unused;
-    std::uint32_t size[64], block[64];
-  };
-  struct Group {
-    std::uint32_t bound, live;
-  };
+  // The first slots hold no block, so that there is something before any front: nothing, and an
+  // edge of size 0, where trimming ends.
+  static constexpr Slot kFirst = 2;
+  static constexpr std::uint64_t kEdge = HeapArea::kBad;
 
-  void put(std::uint32_t slot, HeapOffset block, std::uint32_t size) {
-    buckets_[slot / 64].live |= std::uint64_t{1} << (slot % 64);
-    ++groups_[slot / 4096].live;
-    set(slot, block, size);
+  void raise_bound(std::uint32_t bucket, std::uint32_t size) {
+    bounds_[bucket] = size;
+    if (group_bounds_[bucket / 64] < size) group_bounds_[bucket / 64] = size;
   }
-  void set(std::uint32_t slot, HeapOffset block, std::uint32_t size) {
-    Bucket& bucket = buckets_[slot / 64];
-    bucket.size[slot % 64] = size;
-    bucket.block[slot % 64] = block;
-    if (bucket.bound < size) {
-      bucket.bound = size;
-      Group& group = groups_[slot / 4096];
-      if (group.bound < size) group.bound = size;
-    }
-    area_.word(block) = slot;
-    area_.word(block + 4) = ~slot;
-  }
-  HeapOffset search(std::uint32_t size, std::uint64_t& steps);
-  HeapOffset find_in_group(std::uint32_t g, std::uint32_t size, std::uint64_t& steps);
+  Slot search(std::uint32_t size, std::uint64_t& steps);
+  Slot find_in_group(std::uint32_t g, std::uint32_t size, std::uint64_t& steps);
+  Slot find_in_bucket(std::uint32_t b, std::uint32_t size, std::uint64_t& steps);
+  std::uint32_t live_in_group(std::uint32_t g) const;
+  std::uint32_t bound_of_bucket(std::uint32_t b) const;
   std::uint32_t last_bucket(std::uint32_t g) const;
+  void grow();
   void make_room();
 
   const HeapArea& area_;
-  PageArray<Bucket> buckets_;
-  PageArray<Group> groups_;
-  std::uint32_t end_ = 0, capacity_ = 0;  // slots
+  PageArray<std::uint64_t> entries_;
+  PageArray<std::uint8_t> live_;  // blocks in a bucket
+  PageArray<std::uint32_t> bounds_, group_bounds_;
+  Slot end_ = kFirst, capacity_ = 0;
   std::uint64_t length_ = 0;
 };
 

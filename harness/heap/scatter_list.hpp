@@ -27,7 +27,6 @@ class ScatterList {
     remove(block, found);
     insert(rest, size, at_top);
   }
-  bool rename_front(HeapOffset, HeapOffset, std::uint32_t) { return false; }
   void remove(HeapOffset block, std::uint32_t size);
   void take(HeapOffset block, std::uint32_t size) { remove(block, size); }
   void replace(HeapOffset old, HeapOffset now, std::uint32_t size);

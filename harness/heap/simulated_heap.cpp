@@ -27,6 +27,7 @@ std::unique_ptr<BlockHeap> heap_in(Arena& arena, const HeapOptions& options) {
 thread_local constinit SimulatedHeap* current_heap = nullptr;
 
 SimulatedHeap::SimulatedHeap(const HeapOptions& options) : blocks_(heap_in(arena_, options)) {
+  unwatched_ = blocks_.get();
   heap_of_slot[arena_.slot()] = this;
   if (options.rules.fill || options.rules.track_sites) watch();
 }
@@ -50,31 +51,32 @@ void SimulatedHeap::drop() {
 HeapWatch& SimulatedHeap::watch() {
   const HeapGuard outside(nullptr);
   if (watch_ == nullptr) watch_ = std::make_unique<HeapWatch>(blocks_->options().rules);
+  unwatched_ = nullptr;
   return *watch_;
 }
 
-void* SimulatedHeap::watched_allocate(std::size_t bytes) {
+void* SimulatedHeap::watched_allocate(std::size_t bytes) noexcept {
   if (watch_->refuses()) return nullptr;
   void* made = blocks_->allocate(bytes);
   if (made != nullptr) watch_->allocated(made, bytes, blocks_->usable_bytes(made));
   return made;
 }
 
-void* SimulatedHeap::watched_allocate_zeroed(std::size_t count, std::size_t bytes) {
+void* SimulatedHeap::watched_allocate_zeroed(std::size_t count, std::size_t bytes) noexcept {
   if (watch_->refuses()) return nullptr;
   void* made = blocks_->allocate_zeroed(count, bytes);
   if (made != nullptr) watch_->zeroed(made, count * bytes);
   return made;
 }
 
-void* SimulatedHeap::watched_allocate_aligned(std::size_t alignment, std::size_t bytes) {
+void* SimulatedHeap::watched_allocate_aligned(std::size_t alignment, std::size_t bytes) noexcept {
   if (watch_->refuses()) return nullptr;
   void* made = blocks_->allocate_aligned(alignment, bytes);
   if (made != nullptr) watch_->aligned(made, bytes, alignment, blocks_->usable_bytes(made));
   return made;
 }
 
-void* SimulatedHeap::watched_reallocate(void* payload, std::size_t bytes) {
+void* SimulatedHeap::watched_reallocate(void* payload, std::size_t bytes) noexcept {
   if (payload == nullptr) return watched_allocate(bytes);
   if (bytes == 0 && !blocks_->options().rules.realloc_to_zero_keeps) {
     watched_release(payload);
@@ -90,7 +92,7 @@ void* SimulatedHeap::watched_reallocate(void* payload, std::size_t bytes) {
 }
 
 // A fault in what follows ends the process; until then the block counts as freed here.
-void SimulatedHeap::watched_release(void* payload) {
+void SimulatedHeap::watched_release(void* payload) noexcept {
   if (payload == nullptr) return;
   watch_->released(payload);
   blocks_->release(payload);

@@ -29,24 +29,24 @@ class SimulatedHeap {
   SimulatedHeap& operator=(const SimulatedHeap&) = delete;
 
   // What the allocation functions of the C library do while this heap is current, or its own.
-  void* allocate(std::size_t bytes) {
-    return watch_ == nullptr ? blocks_->allocate(bytes) : watched_allocate(bytes);
+  void* allocate(std::size_t bytes) noexcept {
+    return unwatched_ != nullptr ? unwatched_->allocate(bytes) : watched_allocate(bytes);
   }
-  void* allocate_zeroed(std::size_t count, std::size_t bytes) {
-    return watch_ == nullptr ? blocks_->allocate_zeroed(count, bytes)
-                             : watched_allocate_zeroed(count, bytes);
+  void* allocate_zeroed(std::size_t count, std::size_t bytes) noexcept {
+    return unwatched_ != nullptr ? unwatched_->allocate_zeroed(count, bytes)
+                                 : watched_allocate_zeroed(count, bytes);
   }
-  void* allocate_aligned(std::size_t alignment, std::size_t bytes) {
-    return watch_ == nullptr ? blocks_->allocate_aligned(alignment, bytes)
-                             : watched_allocate_aligned(alignment, bytes);
+  void* allocate_aligned(std::size_t alignment, std::size_t bytes) noexcept {
+    return unwatched_ != nullptr ? unwatched_->allocate_aligned(alignment, bytes)
+                                 : watched_allocate_aligned(alignment, bytes);
   }
-  void* reallocate(void* payload, std::size_t bytes) {
-    return watch_ == nullptr ? blocks_->reallocate(payload, bytes)
-                             : watched_reallocate(payload, bytes);
+  void* reallocate(void* payload, std::size_t bytes) noexcept {
+    return unwatched_ != nullptr ? unwatched_->reallocate(payload, bytes)
+                                 : watched_reallocate(payload, bytes);
   }
-  void release(void* payload) {
-    if (watch_ == nullptr) {
-      blocks_->release(payload);
+  void release(void* payload) noexcept {
+    if (unwatched_ != nullptr) {
+      unwatched_->release(payload);
     } else {
       watched_release(payload);
     }
@@ -75,12 +75,13 @@ class SimulatedHeap {
   }
 
  private:
-  void* watched_allocate(std::size_t bytes);
-  void* watched_allocate_zeroed(std::size_t count, std::size_t bytes);
-  void* watched_allocate_aligned(std::size_t alignment, std::size_t bytes);
-  void* watched_reallocate(void* payload, std::size_t bytes);
-  void watched_release(void* payload);
+  void* watched_allocate(std::size_t bytes) noexcept;
+  void* watched_allocate_zeroed(std::size_t count, std::size_t bytes) noexcept;
+  void* watched_allocate_aligned(std::size_t alignment, std::size_t bytes) noexcept;
+  void* watched_reallocate(void* payload, std::size_t bytes) noexcept;
+  void watched_release(void* payload) noexcept;
 
+  BlockHeap* unwatched_ = nullptr;  // blocks_ as long as there is no watch
   Arena arena_;
   std::unique_ptr<BlockHeap> blocks_;
   std::unique_ptr<HeapWatch> watch_;

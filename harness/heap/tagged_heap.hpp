@@ -3,6 +3,7 @@
 
 #include <orrery/harness/heap/block_heap.hpp>
 
+#include <cerrno>
 #include <cstring>
 
 namespace orrery::internal {
@@ -19,26 +20,26 @@ struct BlockRules {
        realloc_grows_top = false;
 };
 
-/// List has: holds, insert, remove, take, split, rename_front, replace, find, largest, length,
+/// List has: holds, insert, remove, take, split, replace, find, largest, length,
 /// check (see RecencyList), and `static constexpr bool kScatters`.
 template <class List>
-class TaggedHeap final : public BlockHeap {
+class TaggedHeap : public BlockHeap {
  public:
   TaggedHeap(void* arena, const HeapOptions& options, const BlockRules& rules)
       : BlockHeap(arena, options, rules.least_bytes),
+        list_(area_, options_.rules),
         rules_(rules),
-        poison_(options.rules.poison),
-        list_(area_, options_.rules) {}
+        poison_(options.rules.poison) {}
 
   // Flattened, like release: these two are what flight software waits for.
-  [[gnu::flatten]] void* allocate(std::size_t bytes) override {
+  [[gnu::flatten]] void* allocate(std::size_t bytes) noexcept override {
     const Offset block = take(block_size(bytes), "malloc");
     if (block == 0) return nullptr;
     count_allocation(block);
     return pointer(block);
   }
 
-  void* allocate_zeroed(std::size_t count, std::size_t bytes) override {
+  void* allocate_zeroed(std::size_t count, std::size_t bytes) noexcept override {
     std::size_t total = 0;
     if (__builtin_mul_overflow(count, bytes, &total)) total = SIZE_MAX;  // above any limit
     const Offset block = take(block_size(total), "calloc");
@@ -47,12 +48,15 @@ class TaggedHeap final : public BlockHeap {
     return std::memset(pointer(block), 0, total);
   }
 
-  void* allocate_aligned(std::size_t alignment, std::size_t bytes) override;
-  void* reallocate(void* payload, std::size_t bytes) override;
-  void release(void* payload) override;
+  void* allocate_aligned(std::size_t alignment, std::size_t bytes) noexcept override;
+  void* reallocate(void* payload, std::size_t bytes) noexcept override;
+  void release(void* payload) noexcept override;
   std::uint64_t largest_free_bytes() const override { return list_.largest(); }
   std::uint64_t free_list_length() const override { return list_.length(); }
   bool check() override;
+
+ protected:
+  mutable List list_;  // looking for the largest block tightens its bounds
 
  private:
   // Of the bytes from a free block's start, what belongs to the list.
@@ -96,13 +100,12 @@ class TaggedHeap final : public BlockHeap {
 
   BlockRules rules_;
   bool poison_;
-  mutable List list_;  // looking for the largest block tightens its bounds
 };
 
 // ---- requests
 
 template <class List>
-void* TaggedHeap<List>::allocate_aligned(std::size_t alignment, std::size_t bytes) {
+void* TaggedHeap<List>::allocate_aligned(std::size_t alignment, std::size_t bytes) noexcept {
   if (!is_power_of_two(alignment)) return nullptr;
   const std::size_t natural = area_.align;
   if (alignment <= natural) return allocate(bytes);
@@ -127,7 +130,7 @@ void* TaggedHeap<List>::allocate_aligned(std::size_t alignment, std::size_t byte
 }
 
 template <class List>
-void* TaggedHeap<List>::reallocate(void* payload, std::size_t bytes) {
+void* TaggedHeap<List>::reallocate(void* payload, std::size_t bytes) noexcept {
   if (payload == nullptr) return allocate(bytes);
   if (bytes == 0 && !options_.rules.realloc_to_zero_keeps) {
     release(payload);
@@ -158,7 +161,7 @@ void* TaggedHeap<List>::reallocate(void* payload, std::size_t bytes) {
 }
 
 template <class List>
-[[gnu::flatten]] void TaggedHeap<List>::release(void* payload) {
+[[gnu::flatten]] void TaggedHeap<List>::release(void* payload) noexcept {
   if (payload == nullptr) return;
   const Offset block = live_block(payload, "free");
   if (block == 0) return;
@@ -249,6 +252,7 @@ bool TaggedHeap<List>::grow_to_scatter(std::uint64_t size) {
 template <class List>
 HeapOffset TaggedHeap<List>::exhausted(std::uint64_t size, const char* during) {
   ++failures_;
+  errno = ENOMEM;
   fail(HeapFault::Kind::kExhausted, nullptr, during, size);
   return 0;
 }
@@ -331,16 +335,6 @@ bool TaggedHeap<List>::push_joined(Offset payload, std::uint32_t size) {
   // Within a joined block the old header must not pass for a live block's.
   if (join_before) area_.header(payload) = 0;
   if (poison_) poison_joined(payload, size, join_after, join_before ? leader : 0);
-  if (join_after != join_before) {
-    const Offset neighbour = join_after ? after : payload - leader;
-    const Offset joined = join_after ? payload : neighbour;
-    const std::uint32_t joined_size = size + (join_after ? follower : leader);
-    if (list_.rename_front(neighbour, joined, joined_size)) {
-      area_.tag(joined, joined_size, 0);
-      if (poison_ && join_after) poison(after, kLink_bytes);
-      return true;
-    }
-  }
   if (join_after) {
     list_.remove(after, follower);
     if (poison_) poison(after, kLink_bytes);
