@@ -1,4 +1,5 @@
 #include <orrery/harness/flight/flight_process_impl.hpp>
+#include <orrery/harness/flight/library_closure.hpp>
 #include <orrery/harness/flight/port_table.hpp>
 #include <orrery/harness/flight/stack_frames.hpp>
 #include <orrery/harness/kernel/random.hpp>
@@ -6,6 +7,8 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <dlfcn.h>
+#include <link.h>
 #include <stdexcept>
 
 namespace orrery {
@@ -114,9 +117,7 @@ void FlightProcess::Impl::load() {
     shut_down_library();
     refuse(error.what());
   }
-  if (options.isolation == Isolation::kShared) {
-    globals.emplace(library->loaded_path(), library->base(), work, sizeof *work);
-  }
+  if (options.isolation == Isolation::kShared) watch_globals();
   input_.reserve(64);  // never a null pointer, of an empty message either
 }
 
@@ -386,11 +387,29 @@ void FlightProcess::Impl::report_floating_point() {
            "exceptions); they are put back after every call");
 }
 
+// Of the library and of what it links of the team's own.
+void FlightProcess::Impl::watch_globals() {
+  globals.emplace_back(library->loaded_path(), library->base(), work, sizeof *work);
+  const internal::LibraryClosure closure = internal::read_closure(library->path());
+  for (std::size_t i = 0; i + 1 < closure.parts.size(); ++i) {
+    const std::string& path = closure.parts[i].path;
+    void* handle = dlopen(path.c_str(), RTLD_LAZY | RTLD_NOLOAD);
+    if (handle == nullptr) continue;
+    const std::uintptr_t base = static_cast<const link_map*>(handle)->l_addr;
+    globals.emplace_back(path, base, nullptr, 0);
+    watched_dependencies.push_back(closure.parts[i].name);
+    dlclose(handle);
+  }
+}
+
 void FlightProcess::Impl::report_written_global() {
   ++calls;
   const bool looks = calls <= 16 || (calls & (calls - 1)) == 0;  // then 32, 64 ...
-  if (!globals || !looks || !written_global.empty()) return;
-  written_global = globals->changed();
+  if (!looks || !written_global.empty()) return;
+  for (std::size_t i = 0; i < globals.size() && written_global.empty(); ++i) {
+    written_global = globals[i].changed();
+    if (i > 0 && !written_global.empty()) written_global += " of " + watched_dependencies[i - 1];
+  }
   if (written_global.empty()) return;
   host_log(LogLevel::kWarning, "flight library \"" + options.library +
                                    "\" writes its own globals (" + written_global +

@@ -72,7 +72,8 @@ class FlightProcess::Impl {
   std::unique_ptr<FlightLibrary> library;  // unloaded while all of the above is still there
   orrery_work* work = nullptr;             // of the library; null: it counts none
 
-  std::optional<internal::GlobalsWatch> globals;  // Isolation::kShared
+  std::vector<internal::GlobalsWatch> globals;  // Isolation::kShared; the library's own first
+  std::vector<std::string> watched_dependencies;  // names of the others
   std::string written_global;
   std::uint64_t calls = 0;
 
@@ -110,6 +111,7 @@ class FlightProcess::Impl {
   void tell_of_block(const void* address);
   std::vector<StackFrame> frames(const CallStack& stack) const;
   void report_written_global();
+  void watch_globals();
   bool calling() const { return internal::running_process() == &contained_; }
   std::uint32_t find_output(std::uint32_t id) const;
   static void on_heap_fault(void* self, const HeapFault& fault);

@@ -15,7 +15,7 @@
 #include <vector>
 
 // A child learns from one environment variable where to write its traces and how to vary:
-// "<file>\n<scatter 0|1> <heap seed> <log run> <log from> <log until>".
+// "<file>\n" and the members of RunVariation in order.
 namespace orrery {
 namespace {
 
@@ -36,7 +36,8 @@ std::optional<Child> this_child() {
   Child child;
   RunVariation& v = child.variation;
   std::getline(in, child.file);
-  in >> v.scatter_heaps >> v.heap_seed >> v.log_run >> v.log_from_event >> v.log_until_event;
+  in >> v.scatter_heaps >> v.fill_heaps >> v.own_globals >> v.strict_services >> v.heap_seed >>
+      v.tie_seed >> v.unordered >> v.log_run >> v.log_from_event >> v.log_until_event;
   if (!in) throw std::runtime_error(std::string(kChildVariable) + " is malformed");
   return child;
 }
@@ -45,8 +46,9 @@ std::string to_variable(const Child& child) {
   const RunVariation& v = child.variation;
   std::ostringstream out;
   out << kChildVariable << '=' << child.file << '\n'
-      << v.scatter_heaps << ' ' << v.heap_seed << ' ' << v.log_run << ' ' << v.log_from_event << ' '
-      << v.log_until_event;
+      << v.scatter_heaps << ' ' << v.fill_heaps << ' ' << v.own_globals << ' ' << v.strict_services
+      << ' ' << v.heap_seed << ' ' << v.tie_seed << ' ' << v.unordered << ' ' << v.log_run << ' '
+      << v.log_from_event << ' ' << v.log_until_event;
   return out.str();
 }
 
@@ -76,7 +78,27 @@ struct Repeat {
   std::vector<RunTrace> traces;
 };
 
-// The same test as a child. `other`: under conditions that must not matter.
+// Everything about flight software that must not matter, at once.
+RunVariation varied() {
+  return {.scatter_heaps = true,
+          .fill_heaps = true,
+          .own_globals = true,
+          .heap_seed = kOtherHeapSeed,
+          .tie_seed = flags().shuffle_ties};
+}
+
+RunVariation plain() {
+  return {.tie_seed = flags().shuffle_ties};
+}
+
+RunVariation with_log(RunVariation variation, const TraceDifference& difference) {
+  variation.log_run = difference.run;
+  variation.log_from_event = difference.from_event;
+  variation.log_until_event = difference.until_event;
+  return variation;
+}
+
+// The same test as a child. `other`: under conditions of the program that must not matter.
 Repeat repeat(const testing::TestInfo& test, const RunVariation& variation, bool other) {
   const TemporaryFolder folder;
   const std::string traces = (folder / "traces").string();
@@ -85,7 +107,8 @@ Repeat repeat(const testing::TestInfo& test, const RunVariation& variation, bool
                        "--orrery_seed=" + std::to_string(flags().seed)};
   if (flags().runs) command.arguments.push_back("--orrery_runs=" + std::to_string(*flags().runs));
   command.environment = {to_variable({traces, variation}), "ORRERY_VERIFY_DETERMINISM=0"};
-  command.removed = {"ORRERY_OUT", "ORRERY_RECORD", "ORRERY_LOG", "ORRERY_PROGRESS"};
+  command.removed = {"ORRERY_OUT", "ORRERY_RECORD", "ORRERY_LOG", "ORRERY_PROGRESS",
+                     "ORRERY_SHUFFLE_TIES"};
   if (other) {
     command.other_addresses = true;
     command.environment.push_back("ORRERY_PADDING=" + std::string(8192, 'x'));
@@ -101,14 +124,10 @@ Repeat repeat(const testing::TestInfo& test, const RunVariation& variation, bool
 }
 
 // Where the runs part, to the event: both once more, with a log of the stretch in question.
-std::string first_event(const testing::TestInfo& test, const TraceDifference& difference) {
-  RunVariation plain{.log_run = difference.run,
-                     .log_from_event = difference.from_event,
-                     .log_until_event = difference.until_event};
-  RunVariation varied = plain;
-  varied.scatter_heaps = true;
-  varied.heap_seed = kOtherHeapSeed;
-  const Repeat a = repeat(test, plain, false), b = repeat(test, varied, true);
+std::string first_event(const testing::TestInfo& test, const TraceDifference& difference,
+                        const RunVariation& one, const RunVariation& other) {
+  const Repeat a = repeat(test, with_log(one, difference), false),
+               b = repeat(test, with_log(other, difference), false);
   if (a.traces.size() <= difference.run || b.traces.size() <= difference.run) return "";
   const std::string text =
       describe_log_difference(a.traces[difference.run], b.traces[difference.run]);
@@ -117,6 +136,60 @@ std::string first_event(const testing::TestInfo& test, const TraceDifference& di
          std::to_string(difference.until_event) +
          " were equal: what differs changes from run to run, as the wall clock does, or lies in "
          "random draws alone.";
+}
+
+// The line of a child's output that holds the word, and those after it that are indented: the stack
+// of a crash, without the command that debugs the child.
+std::string lines_with(const std::string& output, const std::string& word) {
+  const std::size_t at = output.find(word);
+  if (at == std::string::npos) return "";
+  std::istringstream lines(output.substr(output.rfind('\n', at) + 1));
+  std::string text, line;
+  std::getline(lines, line);
+  do {
+    text += "\n" + line;
+  } while (std::getline(lines, line) && line.starts_with("  ") && !line.starts_with("  debug"));
+  return text;
+}
+
+// What is it that must not matter and does: one thing varied at a time.
+std::string cause(const testing::TestInfo& test, const std::vector<RunTrace>& first) {
+  const auto differs = [&](RunVariation variation, bool other = false) {
+    variation.tie_seed = flags().shuffle_ties;
+    variation.heap_seed = kOtherHeapSeed;
+    return first_difference(first, repeat(test, variation, other).traces).has_value();
+  };
+  if (differs({})) {
+    const std::string output = repeat(test, {.strict_services = true}, false).outcome.tail;
+    return "it changes from run to run with nothing varied: flight code reads the wall clock, or "
+           "random numbers without a seed" +
+           lines_with(output, "called, which this test forbids");
+  }
+  std::string causes;
+  const auto add = [&causes](const std::string& text) {
+    causes += (causes.empty() ? "" : "; and ") + text;
+  };
+  if (differs({.fill_heaps = true})) {
+    add("it changes with what fresh heap memory holds: flight code reads memory that it has not "
+        "written (an uninitialised variable)");
+  }
+  if (differs({.scatter_heaps = true})) {
+    add(causes.empty()
+            ? "it changes with the addresses of heap blocks: a container ordered or "
+              "hashed by pointers, or an address that is sent"
+            : "it changes with the addresses of heap blocks, which may follow from that");
+  }
+  if (differs({.own_globals = true})) {
+    const std::string output = repeat(test, {}, true).outcome.tail;
+    add("it changes when each instance has globals of its own (Isolation::kCopy): a static that "
+        "all instances share" +
+        lines_with(output, "writes its own globals"));
+  }
+  if (causes.empty() && differs({}, true)) {
+    add("it changes with the environment's size, the program's addresses, recording or the log "
+        "level");
+  }
+  return causes.empty() ? "only several changes together show it" : causes;
 }
 
 std::unique_ptr<TraceCollector>& collector() {
@@ -130,14 +203,42 @@ void write_child_traces(const Child& child, const std::vector<RunTrace>& traces)
 }
 
 void verify(const testing::TestInfo& test, const std::vector<RunTrace>& first) {
-  const Repeat second =
-      repeat(test, {.scatter_heaps = true, .heap_seed = kOtherHeapSeed}, /*other=*/true);
+  const Repeat second = repeat(test, varied(), /*other=*/true);
   if (const auto difference = first_difference(first, second.traces)) {
     ADD_FAILURE() << "the same seed gave another run: " << difference->text
-                  << first_event(test, *difference);
+                  << first_event(test, *difference, plain(), varied())
+                  << "\nCause: " << cause(test, first);
   } else if (!second.outcome.passed()) {
     ADD_FAILURE() << "the same seed gave another result: the test passed, and repeated "
                   << second.outcome.describe() << "; the end of its output:\n"
+                  << second.outcome.tail;
+  }
+}
+
+// The test ran with its ties shuffled; again in the defined order.
+void verify_ties(const testing::TestInfo& test, const std::vector<RunTrace>& shuffled) {
+  const RunVariation defined{.unordered = true};
+  RunVariation other = defined;
+  other.tie_seed = flags().shuffle_ties;
+  const Repeat second = repeat(test, defined, false);
+  const std::string by =
+      "events of equal time and different origin in another order "
+      "(--orrery_shuffle_ties=" +
+      std::to_string(flags().shuffle_ties) + ")";
+  if (test.result()->Failed()) {
+    if (second.outcome.passed()) {
+      ADD_FAILURE() << "depends on tie order: in the defined order the test passes; with " << by
+                    << " it fails";
+    }
+    return;
+  }
+  if (const auto difference = first_unordered_difference(shuffled, second.traces)) {
+    ADD_FAILURE() << difference->text << ": another result with " << by
+                  << first_event(test, *difference, other, defined);
+  } else if (!second.outcome.passed()) {
+    ADD_FAILURE() << "depends on tie order: the test passes with " << by
+                  << ", and in the defined order " << second.outcome.describe()
+                  << "; the end of its output:\n"
                   << second.outcome.tail;
   }
 }
@@ -150,15 +251,12 @@ testing::AssertionResult flies_equally(const std::function<void()>& fly) {
     fly();
     return collected.traces();
   };
-  RunVariation plain, varied{.scatter_heaps = true, .heap_seed = kOtherHeapSeed};
-  const auto difference = first_difference(traces(plain), traces(varied));
+  const RunVariation one,
+      other{.scatter_heaps = true, .fill_heaps = true, .heap_seed = kOtherHeapSeed};
+  const auto difference = first_difference(traces(one), traces(other));
   if (!difference) return testing::AssertionSuccess();
-  for (RunVariation* v : {&plain, &varied}) {
-    v->log_run = difference->run;
-    v->log_from_event = difference->from_event;
-    v->log_until_event = difference->until_event;
-  }
-  const std::vector<RunTrace> a = traces(plain), b = traces(varied);
+  const std::vector<RunTrace> a = traces(with_log(one, *difference)),
+                              b = traces(with_log(other, *difference));
   std::string where;
   if (difference->run < std::min(a.size(), b.size())) {
     where = describe_log_difference(a[difference->run], b[difference->run]);
@@ -174,8 +272,9 @@ void begin_determinism_check() {
   const std::optional<Child> child = this_child();
   if (child) {
     collector() = std::make_unique<TraceCollector>(child->variation);
-  } else if (flags().verify_determinism) {
-    collector() = std::make_unique<TraceCollector>();
+  } else if (flags().verify_determinism || flags().shuffle_ties != 0) {
+    collector() = std::make_unique<TraceCollector>(
+        RunVariation{.tie_seed = flags().shuffle_ties, .unordered = flags().shuffle_ties != 0});
   }
 }
 
@@ -186,8 +285,10 @@ void end_determinism_check(const testing::TestInfo& test) {
   if (const std::optional<Child> child = this_child()) return write_child_traces(*child, traces);
   // A test that failed or was skipped has nothing to repeat; one without a world nothing to
   // compare.
-  if (test.result()->Failed() || test.result()->Skipped() || traces.empty()) return;
-  verify(test, traces);
+  if (test.result()->Skipped() || traces.empty()) return;
+  if (flags().shuffle_ties != 0) verify_ties(test, traces);
+  if (test.result()->Failed()) return;
+  if (flags().verify_determinism) verify(test, traces);
 }
 
 }  // namespace internal

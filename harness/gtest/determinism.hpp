@@ -22,8 +22,11 @@ testing::AssertionResult flies_equally(const std::function<void()>& fly);
 #define EXPECT_DETERMINISTIC(...) EXPECT_TRUE(::orrery::flies_equally([&] __VA_ARGS__))
 
 /// What --orrery_verify_determinism does after each test that made a world: runs it again as a
-/// child process with other heaps, another environment, other addresses, recording turned round and
-/// all logs on, and adds a failure to the test if anything differs.
+/// child process with other heaps, own globals where they are shared, another environment, other
+/// addresses, recording turned round and all logs on, and adds a failure to the test if anything
+/// differs: the first event that does, and the cause, found by varying one thing at a time.
+/// --orrery_shuffle_ties=N runs each test with events of equal time and different origin in an
+/// order drawn from N, then again in the defined one; another result "depends on tie order".
 namespace internal {
 
 /// Before the test's fixture is made, and when the test has ended. The listener calls them.

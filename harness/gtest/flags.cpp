@@ -107,6 +107,10 @@ const std::map<std::string, Setter>& setters() {
        [](Flags& f, std::string_view v) {
          f.verify_determinism = parse_switch("verify_determinism", v);
        }},
+      {"shuffle_ties",
+       [](Flags& f, std::string_view v) {
+         f.shuffle_ties = parse_integer("shuffle_ties", v, 0, kSeedEnd - 1);
+       }},
       {"progress", [](Flags& f, std::string_view v) { f.progress = parse_switch("progress", v); }},
   };
   return kSetters;

@@ -33,7 +33,8 @@ struct Flags {
   RecordSetting record = {};              // --orrery_record=off|events|PERIOD (1s, 500ms, 10)
   LogSetting log = {};                    // --orrery_log=LEVEL[,SPACECRAFT]
   bool verify_determinism = false;  // --orrery_verify_determinism: run each test twice, compare
-  bool progress = false;            // --orrery_progress: progress and a result table
+  std::uint64_t shuffle_ties = 0;  // --orrery_shuffle_ties=N: ties in another order, seeded; 0: not
+  bool progress = false;           // --orrery_progress: progress and a result table
 };
 
 /// Reads and removes the --orrery_* flags. Call it before testing::InitGoogleTest, which evaluates

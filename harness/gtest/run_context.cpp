@@ -61,6 +61,9 @@ std::string replay_command() {
   if (current_test().empty()) return {};
   std::string command = program_name() + " --gtest_filter='" + current_test() +
                         "' --orrery_seed=" + std::to_string(flags().seed);
+  if (flags().shuffle_ties != 0) {
+    command += " --orrery_shuffle_ties=" + std::to_string(flags().shuffle_ties);
+  }
   if (flags().runs) command += " --orrery_runs=" + std::to_string(*flags().runs);
   return command;
 }

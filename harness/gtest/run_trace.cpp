@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <istream>
+#include <iterator>
 #include <ostream>
 #include <stdexcept>
 #include <utility>
@@ -54,6 +55,11 @@ void write_traces(const std::vector<RunTrace>& traces, std::ostream& out) {
         << trace.checkpoints.size() << '\n';
     for (const std::uint64_t hash : trace.checkpoints)
       out << "hash " << hex_digits(hash, 16) << '\n';
+    out << "instants " << trace.instants.size() << '\n';
+    for (const auto& [events, hash] : trace.instants) {
+      out << "at " << events << "\nhash " << hex_digits(hash, 16) << '\n';
+    }
+    out << "unordered " << trace.unordered << '\n';
     out << "log " << trace.log.size() << '\n';
     for (const std::string& line : trace.log) out << "event " << line << '\n';
   }
@@ -73,6 +79,12 @@ std::vector<RunTrace> read_traces(std::istream& in) {
     for (std::uint64_t i = 0; i < checkpoints; ++i) {
       trace.checkpoints.push_back(number_of(in, "hash", 16));
     }
+    const std::uint64_t instants = number_of(in, "instants");
+    for (std::uint64_t i = 0; i < instants; ++i) {
+      const std::uint64_t at = number_of(in, "at");
+      trace.instants.emplace_back(at, number_of(in, "hash", 16));
+    }
+    trace.unordered = value_of(in, "unordered");
     const std::uint64_t lines = number_of(in, "log");
     for (std::uint64_t i = 0; i < lines; ++i) trace.log.push_back(value_of(in, "event"));
     traces.push_back(std::move(trace));
@@ -104,6 +116,23 @@ std::optional<TraceDifference> first_difference(const std::vector<RunTrace>& a,
   return TraceDifference{
       run, 0, 0,
       "the test made " + std::to_string(a.size()) + " runs; repeated, " + std::to_string(b.size())};
+}
+
+std::optional<TraceDifference> first_unordered_difference(const std::vector<RunTrace>& a,
+                                                          const std::vector<RunTrace>& b) {
+  for (std::size_t run = 0; run < std::min(a.size(), b.size()); ++run) {
+    const RunTrace &x = a[run], &y = b[run];
+    if (x.unordered == y.unordered && x.random_fingerprint == y.random_fingerprint) continue;
+    const auto [at_x, at_y] =
+        std::mismatch(x.instants.begin(), x.instants.end(), y.instants.begin(), y.instants.end());
+    const std::uint64_t from = at_x == x.instants.begin() ? 0 : std::prev(at_x)->first;
+    // One checkpoint comes up to an instant's events late.
+    return TraceDifference{run, from, from + 2 * EventLoop::kCheckpointEvents,
+                           on_run(run, x) + " depends on tie order"};
+  }
+  if (a.size() == b.size()) return {};
+  return TraceDifference{std::min(a.size(), b.size()), 0, 0,
+                         "the number of the test's runs depends on tie order"};
 }
 
 std::string describe_log_difference(const RunTrace& a, const RunTrace& b) {

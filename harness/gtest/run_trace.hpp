@@ -7,6 +7,7 @@
 #include <iosfwd>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace orrery {
@@ -18,6 +19,10 @@ struct RunTrace {
   std::string fingerprint, random_fingerprint;
   std::vector<std::uint64_t> checkpoints;  // the fingerprint's hash after every 4096 events
   std::vector<std::string> log;            // of a window of events, a line each
+  // To which the order of ties does not matter, where that is asked for: the whole run's, and after
+  // some events.
+  std::string unordered = {};
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> instants = {};  // events, hash
 
   friend bool operator==(const RunTrace&, const RunTrace&) = default;
 };
@@ -37,14 +42,23 @@ struct TraceDifference {
 std::optional<TraceDifference> first_difference(const std::vector<RunTrace>& a,
                                                 const std::vector<RunTrace>& b);
 
+/// The same of runs whose ties came in another order.
+std::optional<TraceDifference> first_unordered_difference(const std::vector<RunTrace>& a,
+                                                          const std::vector<RunTrace>& b);
+
 /// The first lines of two logs that differ, side by side; empty if none does.
 std::string describe_log_difference(const RunTrace& a, const RunTrace& b);
 
 /// What a second run does differently, and what is asked of it. None of it may change a result.
 struct RunVariation {
-  bool scatter_heaps = false;  // each block anywhere in its arena, fresh memory filled otherwise
+  bool scatter_heaps = false;    // each block anywhere in its arena
+  bool fill_heaps = false;       // fresh memory filled otherwise
+  bool own_globals = false;      // Isolation::kCopy where the test has kShared
+  bool strict_services = false;  // HostServices::kStrict where the test has kHost
   std::uint64_t heap_seed = 0;
-  std::size_t log_run = 0;  // number of the world of which a log is kept, for these events
+  std::uint64_t tie_seed = 0;  // order of events at one instant; 0: the defined one
+  bool unordered = false;      // leave RunTrace::unordered
+  std::size_t log_run = 0;     // number of the world of which a log is kept, for these events
   std::uint64_t log_from_event = 0, log_until_event = 0;  // none if equal
 };
 

@@ -25,6 +25,7 @@ class EventLoop::Running {
     loop.current_owner_ = event.key.destination;
     loop.in_fingerprint_ = event.key.phase != Phase::kRecorder;
     if (!loop.in_fingerprint_) return;
+    if (loop.fingerprint_.keeps_unordered()) loop.note_instant(event.key.t);
     sim_event = ++loop.executed_;
     loop.fingerprint_.event(event.key, event.kind->id);
     loop.last_ = {event.key, event.kind, loop.fingerprint_.chain(event.key.destination)};
@@ -34,6 +35,10 @@ class EventLoop::Running {
   ~Running() {
     if (loop_.in_fingerprint_) {
       loop_.last_.chain = loop_.fingerprint_.chain(event_.key.destination);
+      if (loop_.fingerprint_.keeps_unordered()) {
+        loop_.fingerprint_.end_event(event_.key);
+        loop_.last_.chain = loop_.fingerprint_.this_event();
+      }
       if (loop_.keep_log_ && loop_.executed_ > loop_.log_from_ &&
           loop_.executed_ <= loop_.log_until_) {
         loop_.log_.push_back(loop_.last_);
@@ -122,6 +127,13 @@ void EventLoop::fingerprint_payload(Bytes payload) {
     throw std::logic_error("EventLoop::fingerprint_payload: no event is running");
   }
   if (in_fingerprint_) fingerprint_.payload(current_owner_, payload);
+}
+
+// Only where an instant begins are the events so far the same ones in another order of ties.
+void EventLoop::note_instant(SimTime t) {
+  const std::uint64_t last = instant_checkpoints_.empty() ? 0 : instant_checkpoints_.back().events;
+  if (executed_ < last + kCheckpointEvents || last_.key.t == t) return;
+  instant_checkpoints_.push_back({executed_, fingerprint_.unordered_hash()});
 }
 
 void EventLoop::throw_no_owner(const char* role, OwnerId id) const {

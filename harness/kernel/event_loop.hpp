@@ -79,6 +79,16 @@ class EventLoop {
   static constexpr std::uint64_t kCheckpointEvents = 4096;
   void keep_checkpoints() { keep_checkpoints_ = true; }
   const std::vector<std::uint64_t>& checkpoints() const { return checkpoints_; }
+  /// Before the first event: as EventQueue::shuffle_ties().
+  void shuffle_ties(std::uint64_t seed) { queue_.shuffle_ties(seed); }
+  /// Before the first event: keeps Fingerprint::unordered_hash(), and notes it at the first new
+  /// instant after every kCheckpointEvents. The log then has each event's own hash as its chain.
+  void keep_unordered() { fingerprint_.keep_unordered(); }
+  struct InstantCheckpoint {
+    std::uint64_t events = 0;  // executed before
+    std::uint64_t hash = 0;
+  };
+  const std::vector<InstantCheckpoint>& instant_checkpoints() const { return instant_checkpoints_; }
   const std::vector<EventRecord>& log() const { return log_; }
   /// Without the recorder's: the n-th event is the same one whatever is recorded.
   std::uint64_t events_executed() const { return executed_; }
@@ -99,6 +109,7 @@ class EventLoop {
   [[noreturn]] void throw_no_owner(const char* role, OwnerId id) const;
   void require_between_events(const char* function) const;
   void move_to(SimTime t);
+  void note_instant(SimTime t);
 
   EventQueue queue_;
   Fingerprint fingerprint_;
@@ -112,6 +123,7 @@ class EventLoop {
   bool keep_log_ = false;
   bool keep_checkpoints_ = false;
   std::vector<std::uint64_t> checkpoints_;
+  std::vector<InstantCheckpoint> instant_checkpoints_;
   std::uint64_t log_from_ = 0, log_until_ = UINT64_MAX;
   std::uint64_t executed_ = 0;
 };

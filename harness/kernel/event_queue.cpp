@@ -1,4 +1,5 @@
 #include <orrery/harness/kernel/event_queue.hpp>
+#include <orrery/harness/kernel/hash.hpp>
 
 #include <algorithm>
 #include <stdexcept>
@@ -19,14 +20,24 @@ std::size_t parent(std::size_t position) {
                               " is before the last popped event, " + to_string(last_popped));
 }
 
+}  // namespace
+
 // Monotone in (phase, destination, origin): a larger key never gets a smaller tie. Origins from 255
-// on share a value and are told apart in their slots.
-std::uint32_t tie_of(const EventKey& key) {
-  return std::uint32_t{static_cast<std::uint8_t>(key.phase)} << 24 |
-         std::uint32_t{key.destination} << 8 | std::min<std::uint32_t>(key.origin, 255);
+// on share a value and are told apart in their slots, as are those whose hash is the same.
+std::uint32_t EventQueue::tie_of(const EventKey& key) const {
+  const std::uint32_t phase = std::uint32_t{static_cast<std::uint8_t>(key.phase)} << 24;
+  if (shuffles_) [[unlikely]] {
+    const std::uint64_t at = hash_word(tie_seed_, static_cast<std::uint64_t>(to_ns(key.t)));
+    return phase | static_cast<std::uint32_t>(hash_word(at, key.origin) >> 40);
+  }
+  return phase | std::uint32_t{key.destination} << 8 | std::min<std::uint32_t>(key.origin, 255);
 }
 
-}  // namespace
+void EventQueue::shuffle_ties(std::uint64_t seed) {
+  if (entries() != 0) throw std::logic_error("EventQueue::shuffle_ties: events are pending");
+  tie_seed_ = seed;
+  shuffles_ = true;
+}
 
 bool EventQueue::before(Entry a, Entry b) const {
   if (a.t_ns != b.t_ns) [[likely]] {
@@ -38,8 +49,10 @@ bool EventQueue::before(Entry a, Entry b) const {
 bool EventQueue::tied_before(Entry a, Entry b) const {
   const Slot& slot_a = slots_[a.slot()];
   const Slot& slot_b = slots_[b.slot()];
-  return slot_a.origin != slot_b.origin ? slot_a.origin < slot_b.origin
-                                        : slot_a.counter < slot_b.counter;
+  if (slot_a.origin != slot_b.origin) return slot_a.origin < slot_b.origin;
+  // Of equal ties the destination differs only where ties are shuffled.
+  if (slot_a.destination != slot_b.destination) return slot_a.destination < slot_b.destination;
+  return slot_a.counter < slot_b.counter;
 }
 
 std::size_t EventQueue::earliest_child(std::size_t first, std::size_t end) const {
@@ -145,6 +158,7 @@ EventHandle EventQueue::push(const EventKey& key, const EventKind* kind, Action&
   slot.kind = kind;
   slot.counter = key.counter;
   slot.origin = key.origin;
+  slot.destination = key.destination;
   const Entry entry{to_ns(key.t), std::uint64_t{tie_of(key)} << 32 | index};
   heap_.push_back(entry);
   lift(heap_.size() - 1, entry);
@@ -168,8 +182,8 @@ bool EventQueue::pop(SimTime latest, Event& event) {
       __builtin_prefetch(&next.generation);
     }
     last_popped_ = from_ns(top.t_ns);
-    event.key = {last_popped_, static_cast<Phase>(top.tie() >> 24),
-                 static_cast<OwnerId>(top.tie() >> 8 & 0xffff), slot.origin, slot.counter};
+    event.key = {last_popped_, static_cast<Phase>(top.tie() >> 24), slot.destination, slot.origin,
+                 slot.counter};
     event.kind = slot.kind;
     event.action = std::move(slot.action);
     ++slot.generation;

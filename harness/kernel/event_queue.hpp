@@ -35,6 +35,12 @@ class EventQueue {
   bool cancel(EventHandle handle);
   bool pending(EventHandle handle) const;
 
+  /// Before the first push: events of equal time and phase but different origin come in an order
+  /// drawn from `seed`, another one at each instant; those of one origin stay in theirs. For
+  /// finding out whether a result depends on the order of ties.
+  /// @throws std::logic_error  events are pending.
+  void shuffle_ties(std::uint64_t seed);
+
   /// Moves the earliest event to `event` if its time is <= `latest`; false if there is none.
   bool pop(SimTime latest, Event& event);
 
@@ -50,7 +56,8 @@ class EventQueue {
 
  private:
   // Two words, so that one travels in registers. The upper half of `tie_and_slot` is phase,
-  // destination and the origin, if that is below 255: what follows in the key is in the slot.
+  // destination and the origin, if that is below 255, or phase and a hash of instant and origin
+  // where ties are shuffled: what follows in the key is in the slot.
   struct Entry {
     std::int64_t t_ns;
     std::uint64_t tie_and_slot;
@@ -64,6 +71,7 @@ class EventQueue {
     std::uint64_t counter = 0;     // of the key; of a free slot, the next free one
     std::uint32_t generation = 1;  // moves on when the event is popped or cancelled
     OwnerId origin = 0;
+    OwnerId destination = 0;
   };
 
   // The children of the entry at position i lie at 4 * (i - 2) and after, which makes 3 the root.
@@ -81,6 +89,7 @@ class EventQueue {
   inline std::uint32_t take_slot();
   inline void free_slot(std::uint32_t index);
   bool tied_before(Entry a, Entry b) const;
+  std::uint32_t tie_of(const EventKey& key) const;
   void compact();
 
   std::vector<Entry, CacheLineAllocator<Entry>> heap_ =
@@ -89,6 +98,8 @@ class EventQueue {
   std::uint32_t first_free_ = kNone;
   std::size_t dead_ = 0;
   SimTime last_popped_ = SimTime::min();
+  std::uint64_t tie_seed_ = 0;
+  bool shuffles_ = false;
 };
 
 }  // namespace orrery

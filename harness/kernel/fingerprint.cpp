@@ -15,6 +15,7 @@ bool same(const EventRecord& a, const EventRecord& b) {
 
 void Fingerprint::add_owner() {
   chains_.push_back(0);
+  if (keeps_unordered_) unordered_.emplace_back();
 }
 
 void Fingerprint::event(const EventKey& key, std::uint16_t kind_id) {
@@ -24,10 +25,32 @@ void Fingerprint::event(const EventKey& key, std::uint16_t kind_id) {
   chain = hash_word(chain, static_cast<std::uint64_t>(to_ns(key.t)));
   chain = hash_word(chain, what);
   chain = hash_word(chain, key.counter);
+  if (keeps_unordered_) this_event_ = hash_word(static_cast<std::uint64_t>(to_ns(key.t)), what);
+}
+
+void Fingerprint::end_event(const EventKey& key) {
+  Unordered& owner = unordered_[key.destination];
+  if (key.t != owner.t) {
+    owner.chain = owner.folded();
+    owner.sum = 0;
+    owner.t = key.t;
+  }
+  owner.sum += this_event_;
+}
+
+std::uint64_t Fingerprint::Unordered::folded() const {
+  return hash_word(chain, sum);
+}
+
+std::uint64_t Fingerprint::unordered_hash() const {
+  std::uint64_t h = hash_word(0, unordered_.size());
+  for (const Unordered& owner : unordered_) h = hash_word(h, owner.folded());
+  return h;
 }
 
 void Fingerprint::payload(OwnerId owner, Bytes bytes) {
   chains_[owner] = hash_bytes(chains_[owner], bytes);
+  if (keeps_unordered_) this_event_ = hash_bytes(this_event_, bytes);
 }
 
 std::uint64_t Fingerprint::hash() const {

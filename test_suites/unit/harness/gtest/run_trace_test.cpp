@@ -25,6 +25,8 @@ RunTrace trace(std::uint64_t seed, std::vector<std::uint64_t> checkpoints,
 
 TEST(RunTraceTest, ReadsBackWhatItWrote) {
   std::vector<RunTrace> traces = {trace(1, {0x123456789abcdef0u, 2}, "aa"), trace(2, {}, "bb")};
+  traces[0].unordered = "0123456789abcdef";
+  traces[0].instants = {{4099, 7}, {8200, 0xfedcba9876543210u}};
   traces[1].log = {"frame arrival of deputy from chief-deputy at 3610 s, chain 00", ""};
   std::stringstream text;
   write_traces(traces, text);
@@ -54,6 +56,23 @@ TEST(RunTraceTest, ADifferenceLiesAfterTheLastEqualCheckpoint) {
   EXPECT_EQ(difference->from_event, 2u * 4096);
   EXPECT_EQ(difference->until_event, 3u * 4096);
   EXPECT_THAT(difference->text, testing::HasSubstr("the run (seed 1): fingerprint aa"));
+}
+
+// Of runs with other ties the ordered fingerprints say nothing; the instants tell where to look.
+TEST(RunTraceTest, AnUnorderedDifferenceLiesAfterTheLastEqualInstant) {
+  std::vector<RunTrace> a = {trace(1, {5, 6}, "aa")}, b = {trace(1, {7, 8}, "bb")};
+  a[0].unordered = b[0].unordered = "cc";
+  EXPECT_FALSE(first_unordered_difference(a, b));
+  a[0].instants = {{4099, 1}, {8200, 2}};
+  b[0].instants = {{4099, 1}, {8200, 3}};
+  b[0].unordered = "dd";
+  const auto difference = first_unordered_difference(a, b);
+  ASSERT_TRUE(difference);
+  EXPECT_EQ(difference->from_event, 4099u);
+  EXPECT_EQ(difference->until_event, 4099u + 2 * 4096);
+  EXPECT_EQ(difference->text, "the run (seed 1) depends on tie order");
+  b.pop_back();
+  EXPECT_TRUE(first_unordered_difference(a, b));
 }
 
 TEST(RunTraceTest, ASecondRunOrAMissingOneIsNamed) {

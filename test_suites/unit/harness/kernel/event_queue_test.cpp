@@ -9,6 +9,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "allocations.hpp"
@@ -41,6 +42,59 @@ TEST_F(EventQueueTest, EarlierEventsPopFirst) {
   push({.t = at(10)});
   push({.t = at(20)});
   EXPECT_EQ(pop_all(), (std::vector<EventKey>{{.t = at(10)}, {.t = at(20)}, {.t = at(30)}}));
+}
+
+// Of 300 origins, two messages each in two phases at two instants.
+std::vector<EventKey> shuffled_keys(std::uint64_t seed) {
+  EventQueue queue;
+  queue.shuffle_ties(seed);
+  for (OwnerId origin = 300; origin-- > 0;) {
+    for (std::uint64_t counter = 4; counter-- > 0;) {
+      const Phase phase = counter % 2 == 0 ? Phase::kDelivery : Phase::kTick;
+      for (const SimTime t : {at(1), at(2)}) {
+        queue.push({t, phase, static_cast<OwnerId>(origin % 7), origin, counter}, &kKind, [] {});
+      }
+    }
+  }
+  std::vector<EventKey> keys;
+  Event event;
+  while (queue.pop(kForever, event)) keys.push_back(event.key);
+  return keys;
+}
+
+std::vector<OwnerId> origins_of(const std::vector<EventKey>& keys, SimTime t) {
+  std::vector<OwnerId> origins;
+  for (const EventKey& key : keys) {
+    if (key.t == t && key.phase == Phase::kDelivery && key.counter == 0) {
+      origins.push_back(key.origin);
+    }
+  }
+  return origins;
+}
+
+TEST(ShuffledTiesTest, OriginsComeInADrawnOrderAndAllElseInItsOwn) {
+  const std::vector<EventKey> keys = shuffled_keys(5);
+  ASSERT_EQ(keys.size(), 2400u);
+  std::map<std::pair<OwnerId, Phase>, EventKey> last;
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    if (i > 0) {
+      EXPECT_LE(std::pair(keys[i - 1].t, keys[i - 1].phase), std::pair(keys[i].t, keys[i].phase));
+    }
+    const auto [of_origin, is_first] = last.try_emplace({keys[i].origin, keys[i].phase}, keys[i]);
+    if (!is_first) EXPECT_LT(of_origin->second, keys[i]);
+    of_origin->second = keys[i];
+  }
+  const std::vector<OwnerId> order = origins_of(keys, at(1));
+  EXPECT_EQ(order.size(), 300u);
+  EXPECT_FALSE(std::is_sorted(order.begin(), order.end()));
+  EXPECT_NE(order, origins_of(keys, at(2)));  // anew at each instant
+  EXPECT_EQ(keys, shuffled_keys(5));
+  EXPECT_NE(order, origins_of(shuffled_keys(6), at(1)));
+}
+
+TEST_F(EventQueueTest, TiesAreShuffledBeforeTheFirstEventAlone) {
+  push({.t = at(1)});
+  EXPECT_THROW(queue.shuffle_ties(1), std::logic_error);
 }
 
 // Each key is less than the next by one field alone, the fields after it being larger.
