@@ -237,14 +237,18 @@ bool RandomStream::bernoulli(double probability) {
 }
 
 void normal_triples(std::span<RandomStream* const> streams, std::span<std::array<double, 3>> out) {
+  // Written as words of 64 bits and read in pairs only when all are there: a pair that was just
+  // written has to wait for the first cache.
+  std::array<std::array<std::uint64_t, 2>, kBatch> blocks;
   Batch q, x;
-  q.fill(0);  // the last may have no neighbour
   for (std::size_t from = 0; from < streams.size(); from += kBatch) {
     const std::size_t n = std::min(kBatch, streams.size() - from);
+    for (std::size_t i = 0; i < n; ++i) blocks[i] = streams[from + i]->block();
     for (std::size_t i = 0; i < n; ++i) {
-      const auto triple = centred_triple(streams[from + i]->block());
-      std::copy(triple.begin(), triple.end(), q.begin() + static_cast<std::ptrdiff_t>(3 * i));
+      const auto triple = centred_triple(blocks[i]);
+      q[3 * i] = triple[0], q[3 * i + 1] = triple[1], q[3 * i + 2] = triple[2];
     }
+    if (n % 2 != 0) q[3 * n] = 0;  // the last one's neighbour
     quantiles(q, 3 * n, x);
     for (std::size_t i = 0; i < n; ++i) out[from + i] = {x[3 * i], x[3 * i + 1], x[3 * i + 2]};
   }
