@@ -81,7 +81,9 @@ TEST(ShuffledTiesTest, OriginsComeInADrawnOrderAndAllElseInItsOwn) {
       EXPECT_LE(std::pair(keys[i - 1].t, keys[i - 1].phase), std::pair(keys[i].t, keys[i].phase));
     }
     const auto [of_origin, is_first] = last.try_emplace({keys[i].origin, keys[i].phase}, keys[i]);
-    if (!is_first) EXPECT_LT(of_origin->second, keys[i]);
+    if (!is_first) {
+      EXPECT_LT(of_origin->second, keys[i]);
+    }
     of_origin->second = keys[i];
   }
   const std::vector<OwnerId> order = origins_of(keys, at(1));
