@@ -16,6 +16,9 @@ void FlightComputer::reboot(SimTime t, Duration boot_delay, ResetCause cause) {
 void FlightComputer::power_cycle(SimTime t, Duration boot_delay) {
   impl_->reset(t, internal::kPowerCycle, ResetCause::kPowerOn, boot_delay);
 }
+void FlightComputer::jump_clock(SimTime t, Duration by) {
+  impl_->jump_clock(t, by);
+}
 void FlightComputer::kill(SimTime t) {
   impl_->reset(t, internal::kKill, ResetCause::kCommanded, Duration{1});
 }

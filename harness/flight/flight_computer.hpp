@@ -65,6 +65,9 @@ class FlightComputer {
   void power_cycle(SimTime t, Duration boot_delay);
   /// As reboot(), but it stays off.
   void kill(SimTime t);
+  /// From `t` on, before anything else at that instant, the onboard clock is off by that much more.
+  /// The pending tick moves to where the clock will show its time; one in the past fires at once.
+  void jump_clock(SimTime t, Duration by);
   /// Orderly end, now; waiting inputs and the tick are dropped. Nothing if not alive.
   void shut_down();
 

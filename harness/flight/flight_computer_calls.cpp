@@ -198,10 +198,22 @@ void FlightComputer::Impl::set_tick(std::int64_t onboard_ns) {
     warned_of_tick_ = true;
     return;
   }
+  tick_onboard_ns_ = onboard_ns;
   const SimTime due = clock.truth(onboard_ns);
+  const SimTime soonest = std::max(busy_until_, loop_.now());
   tick_event_ =
-      loop_.schedule(timings_.tick().with_jitter(due <= loop_.now() ? busy_until_ : due),
+      loop_.schedule(timings_.tick().with_jitter(due <= loop_.now() ? soonest : due),
                      {Phase::kTick, owner_, owner_, &internal::kTick}, [this] { on_tick(); });
+}
+
+void FlightComputer::Impl::jump_clock(SimTime t, Duration by) {
+  loop_.schedule(t, {Phase::kFault, owner_, owner_, &internal::kClockJump},
+                 [this, by] { on_clock_jump(by); });
+}
+
+void FlightComputer::Impl::on_clock_jump(Duration by) {
+  clock.set_offset(clock.offset() + by);
+  if (loop_.pending(tick_event_)) set_tick(tick_onboard_ns_);
 }
 
 void FlightComputer::Impl::withdraw_tick() {

@@ -24,6 +24,7 @@ inline constexpr EventKind kReboot{105, "flight reboot"};
 inline constexpr EventKind kPowerCycle{106, "flight power cycle"};
 inline constexpr EventKind kKill{107, "flight kill"};
 inline constexpr EventKind kBootLoop{108, "boot_loop"};
+inline constexpr EventKind kClockJump{120, "clock jump"};
 
 }  // namespace internal
 
@@ -32,6 +33,7 @@ class FlightComputer::Impl {
   Impl(EventLoop& loop, OwnerId owner, FlightProcessOptions options, Hooks hooks);
 
   void boot();
+  void jump_clock(SimTime t, Duration by);
   void reset(SimTime t, const EventKind& kind, ResetCause cause, Duration boot_delay);
   void shut_down();
   void deliver(std::string_view port, Bytes bytes, OwnerId origin);
@@ -83,6 +85,7 @@ class FlightComputer::Impl {
   void take_over(CallOutcome outcome);
   void release_outputs();
   void set_tick(std::int64_t onboard_ns);
+  void on_clock_jump(Duration by);
   void withdraw_tick();
   bool makes_progress();
   void bury();
@@ -110,7 +113,8 @@ class FlightComputer::Impl {
   EventHandle free_event_;  // pending while something waits
 
   EventHandle tick_event_;
-  bool tick_waits_ = false;  // it was due while the processor was busy
+  std::int64_t tick_onboard_ns_ = 0;  // asked for, of the pending one
+  bool tick_waits_ = false;           // it was due while the processor was busy
   SimTime tick_due_;
   bool warned_of_tick_ = false;
   SimTime last_tick_;

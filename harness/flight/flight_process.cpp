@@ -3,7 +3,9 @@
 #include <orrery/harness/flight/port_table.hpp>
 #include <orrery/harness/flight/stack_frames.hpp>
 #include <orrery/harness/kernel/random.hpp>
+#include <orrery/harness/kernel/text.hpp>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -576,6 +578,20 @@ const std::vector<std::string>& FlightProcess::edited_symbols() const {
 }
 const std::string& FlightProcess::written_global() const {
   return impl_->written_global;
+}
+std::string FlightProcess::flip_bit(FlightMemory memory, double place) {
+  impl_->require_between_calls("flip_bit");
+  if (memory == FlightMemory::kGlobals) {
+    return internal::flip_global(impl_->library->loaded_path(), impl_->library->base(), place);
+  }
+  if (impl_->heap == nullptr || !heap_simulation_available()) return "";
+  BlockHeap& blocks = impl_->heap->blocks();
+  const std::uint64_t bits = 8 * blocks.heap_bytes();
+  if (bits == 0) return "";
+  const auto bit =
+      std::min(bits - 1, static_cast<std::uint64_t>(place * static_cast<double>(bits)));
+  static_cast<std::byte*>(blocks.first_block())[bit / 8] ^= std::byte{1} << (bit % 8);
+  return "bit " + std::to_string(bit % 8) + " of byte 0x" + hex_digits(bit / 8, 8) + " of the heap";
 }
 const std::vector<std::string>& FlightProcess::shared_dependencies() const {
   return impl_->library->shared_dependencies();

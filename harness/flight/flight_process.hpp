@@ -55,6 +55,12 @@ std::string to_string(const LeakReport& leak);
 
 class SimulatedHeap;
 
+/// Where a bit may flip.
+enum class FlightMemory : std::uint8_t {
+  kHeap,     // from the first block to the top, headers and free blocks too
+  kGlobals,  // .data and .bss of the library itself
+};
+
 /// Runs flight code to completion and keeps it from the simulator, and the simulator from it.
 ///
 /// Boundary   Within a call the process's heap is current and `sim_process` names it; MXCSR and the
@@ -138,6 +144,10 @@ class FlightProcess {
   /// Blocks allocated after one HeapWatch::mark() up to another that are live now, by call stack.
   /// @throws std::logic_error  HeapRules::track_sites is off.
   std::vector<LeakReport> leaks(std::uint64_t after, std::uint64_t until) const;
+  /// Inverts one bit of its memory: the one at `place`, 0 to 1, of the whole. Says which: "bit 3 of
+  /// byte 0x40 of the heap", "... of counter"; empty where there is no such memory.
+  /// @throws std::logic_error  within a call.
+  std::string flip_bit(FlightMemory memory, double place);
   /// It outlives crash and shut-down, and may be handed to the next process.
   const std::shared_ptr<NonVolatileMemory>& memory() const;
 

@@ -1,6 +1,7 @@
 #include <orrery/harness/flight/globals_watch.hpp>
 #include <orrery/harness/flight/library_closure.hpp>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -13,6 +14,10 @@ namespace {
 // What lies between a library's variables is forbidden ground under AddressSanitizer, to memcpy and
 // memcmp as well; a function of our own may read it.
 #ifdef __SANITIZE_ADDRESS__
+[[gnu::no_sanitize_address]] void flip(volatile std::byte* at, int bit) {
+  *at = *at ^ (std::byte{1} << bit);
+}
+
 [[gnu::no_sanitize_address]] std::byte read(const volatile std::byte* from) {
   return *from;
 }
@@ -28,6 +33,10 @@ bool equal(const std::byte* a, const std::vector<std::byte>& b) {
   return true;
 }
 #else
+void flip(std::byte* at, int bit) {
+  *at ^= std::byte{1} << bit;
+}
+
 std::byte read(const std::byte* from) {
   return *from;
 }
@@ -40,6 +49,19 @@ bool equal(const std::byte* a, const std::vector<std::byte>& b) {
   return std::memcmp(a, b.data(), b.size()) == 0;
 }
 #endif
+
+std::string variable_name(const ElfImage& image, std::uintptr_t offset) {
+  const std::string symbol = image.variable_at(offset);
+  if (symbol.empty()) {
+    char text[48];
+    std::snprintf(text, sizeof text, "the byte at 0x%zx", static_cast<std::size_t>(offset));
+    return text;
+  }
+  int status = 0;
+  const std::unique_ptr<char, void (*)(void*)> readable(
+      abi::__cxa_demangle(symbol.c_str(), nullptr, nullptr, &status), std::free);
+  return status == 0 ? readable.get() : symbol;
+}
 
 }  // namespace
 
@@ -76,17 +98,26 @@ std::size_t GlobalsWatch::bytes() const {
 }
 
 std::string GlobalsWatch::name_of(const std::byte* address) const {
-  const std::uintptr_t offset = reinterpret_cast<std::uintptr_t>(address) - base_;
-  const std::string symbol = image_.variable_at(offset);
-  if (symbol.empty()) {
-    char text[48];
-    std::snprintf(text, sizeof text, "the byte at 0x%zx", static_cast<std::size_t>(offset));
-    return text;
+  return variable_name(image_, reinterpret_cast<std::uintptr_t>(address) - base_);
+}
+
+std::string flip_global(const std::string& path, std::uintptr_t base, double place) {
+  const ElfImage image(read_file(path));
+  std::uint64_t bits = 0;
+  for (const auto& range : image.writable_data()) bits += 8 * (range.end - range.begin);
+  if (bits == 0) return "";
+  auto bit = std::min(bits - 1, static_cast<std::uint64_t>(place * static_cast<double>(bits)));
+  for (const auto& range : image.writable_data()) {
+    const std::uint64_t here = 8 * (range.end - range.begin);
+    if (bit >= here) {
+      bit -= here;
+      continue;
+    }
+    const std::uint64_t offset = range.begin + bit / 8;
+    flip(reinterpret_cast<std::byte*>(base + offset), static_cast<int>(bit % 8));
+    return "bit " + std::to_string(bit % 8) + " of a byte of " + variable_name(image, offset);
   }
-  int status = 0;
-  const std::unique_ptr<char, void (*)(void*)> readable(
-      abi::__cxa_demangle(symbol.c_str(), nullptr, nullptr, &status), std::free);
-  return status == 0 ? readable.get() : symbol;
+  return "";
 }
 
 }  // namespace orrery::internal

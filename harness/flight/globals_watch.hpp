@@ -39,4 +39,8 @@ class GlobalsWatch {
   std::vector<Range> ranges_;
 };
 
+/// Inverts one bit of a loaded library's .data and .bss: the one at `place`, 0 to 1, of the whole.
+/// Says which; empty if it has none. @throws std::invalid_argument  `path` is no shared library.
+std::string flip_global(const std::string& path, std::uintptr_t base, double place);
+
 }  // namespace orrery::internal

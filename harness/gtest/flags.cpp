@@ -107,6 +107,7 @@ const std::map<std::string, Setter>& setters() {
        [](Flags& f, std::string_view v) {
          f.verify_determinism = parse_switch("verify_determinism", v);
        }},
+      {"shrink", [](Flags& f, std::string_view v) { f.shrink = parse_switch("shrink", v); }},
       {"shuffle_ties",
        [](Flags& f, std::string_view v) {
          f.shuffle_ties = parse_integer("shuffle_ties", v, 0, kSeedEnd - 1);
@@ -177,7 +178,8 @@ Flags parse_flags(const std::vector<std::string>& arguments,
       throw std::invalid_argument(argument + ": no such flag; known are " + known_flags());
     }
     const bool has_value = equals != std::string_view::npos;
-    const bool is_switch = setter->first == "progress" || setter->first == "verify_determinism";
+    const bool is_switch = setter->first == "progress" || setter->first == "shrink" ||
+                           setter->first == "verify_determinism";
     if (!has_value && !is_switch) {
       throw std::invalid_argument(argument + ": needs a value, as in " + argument + "=VALUE");
     }

@@ -33,6 +33,7 @@ struct Flags {
   RecordSetting record = {};              // --orrery_record=off|events|PERIOD (1s, 500ms, 10)
   LogSetting log = {};                    // --orrery_log=LEVEL[,SPACECRAFT]
   bool verify_determinism = false;  // --orrery_verify_determinism: run each test twice, compare
+  bool shrink = false;              // --orrery_shrink: reduce a failing test's faults, print them
   std::uint64_t shuffle_ties = 0;  // --orrery_shuffle_ties=N: ties in another order, seeded; 0: not
   bool progress = false;           // --orrery_progress: progress and a result table
 };

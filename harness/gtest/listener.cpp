@@ -7,10 +7,20 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <functional>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace orrery {
 namespace {
+
+using EndOfTest = std::function<void(const testing::TestInfo&)>;
+
+std::vector<EndOfTest>& ends_of_tests() {
+  static std::vector<EndOfTest> callbacks;
+  return callbacks;
+}
 
 class Listener : public testing::EmptyTestEventListener {
   void OnTestStart(const testing::TestInfo& test) override {
@@ -21,6 +31,7 @@ class Listener : public testing::EmptyTestEventListener {
   // Before GoogleTest's own printer, so that a failure that is added here is the test's.
   void OnTestEnd(const testing::TestInfo& test) override {
     internal::end_determinism_check(test);
+    for (const EndOfTest& end : ends_of_tests()) end(test);
     set_current_test({});
   }
 
@@ -43,6 +54,10 @@ bool is_unfiltered_shard() {
 }
 
 }  // namespace
+
+void at_test_end(std::function<void(const testing::TestInfo&)> callback) {
+  ends_of_tests().push_back(std::move(callback));
+}
 
 void install_listener() {
   static const bool installed = [] {

@@ -4,7 +4,17 @@
 
 #include <orrery/harness/kernel/simulator_only.hpp>
 
+#include <functional>
+
+namespace testing {
+class TestInfo;
+}
+
 namespace orrery {
+
+/// Calls back when a test has ended, its fixture destroyed and its result known. For rooms that
+/// this one does not know.
+void at_test_end(std::function<void(const testing::TestInfo&)> callback);
 
 /// Appends the listener to GoogleTest's, once. Init does it.
 void install_listener();

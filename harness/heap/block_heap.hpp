@@ -112,6 +112,7 @@ class BlockHeap {
   std::uint64_t allocations() const { return allocations_; }
   std::uint64_t peak_since_mark_bytes() const { return peak_bytes_; }
   std::uint64_t heap_bytes() const { return area_.top - area_.first; }
+  void* first_block() const { return area_.at(area_.first); }  // heap_bytes() from here on
   /// A few buckets of the free list are visited where it holds many blocks; else constant time.
   virtual std::uint64_t largest_free_bytes() const = 0;
   virtual std::uint64_t free_list_length() const = 0;
