@@ -77,6 +77,7 @@ class FormationKeeping {
   Configuration configuration_;
   unsigned char gnss_room_[kGnssRoomBytes];
   novatel_framer gnss_framer_;
+  GnssFix last_fix_;
   CrosslinkSender sender_;
   CrosslinkReceiver receiver_;
   RelativeNavigation navigation_;
@@ -139,7 +140,10 @@ std::int32_t FormationKeeping::gnss(std::int64_t now_ns, Bytes bytes) {
     novatel_frame frame;
     GnssFix fix;
     while (novatel_framer_next(&gnss_framer_, &frame) != 0) {
-      if (read_fix(frame, &fix)) handle_fix(now_ns, fix);
+      if (!read_fix(frame, &fix)) continue;
+      const bool stale = repeats(last_fix_, fix);
+      last_fix_ = fix;
+      if (!stale) handle_fix(now_ns, fix);
     }
   }
   return gnss_framer_.bad_frames == bad_before ? ORRERY_OK : reject();

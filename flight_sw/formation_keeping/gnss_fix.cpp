@@ -39,6 +39,14 @@ bool is_plausible(const GnssFix& fix) {
          fix.sigma_v_mps > 0.0 && std::isfinite(fix.sigma_v_mps);
 }
 
+bool repeats(const GnssFix& before, const GnssFix& fix) {
+  bool same = before.epoch_ns != fix.epoch_ns;
+  for (int k = 0; k < 3; ++k) {
+    same = same && before.r_ECEF[k] == fix.r_ECEF[k] && before.v_ECEF[k] == fix.v_ECEF[k];
+  }
+  return same;
+}
+
 bool read_fix(const novatel_frame& frame, GnssFix* fix) {
   novatel_bestxyz log;
   if (novatel_get_bestxyz(&frame, &log) == 0 || !has_solution(log)) return false;

@@ -21,6 +21,10 @@ struct GnssFix {
 /// zero, time between 1980 and 2099.
 bool is_plausible(const GnssFix& fix);
 
+/// True if a receiver shows an old solution under a new time: never twice the same numbers, with
+/// noise on them.
+bool repeats(const GnssFix& before, const GnssFix& fix);
+
 /// Room for the framer of a stream of which only BESTXYZ is wanted: longer logs are passed over,
 /// and a damaged length delays a fix by no more than one frame.
 constexpr std::size_t kGnssRoomBytes = 28 + 112 + 4;

@@ -18,6 +18,9 @@ constexpr double kMaxStep_s = 300.0;
 constexpr double kReopened_r_m = 50.0;
 constexpr double kReopened_v_mps = 0.1;
 constexpr int kOutliersToDistrust = 3;
+// Opened so often in a row without a measurement that fits, it is beyond repair: a start on a fix
+// that was wrong by kilometres, say. Then the filter starts anew.
+constexpr int kReopeningsToRestart = 3;
 // Own fixes that step back this far come from a receiver that found another time, and replace the
 // old.
 constexpr double kReceiverRestart_s = 60.0;
@@ -144,6 +147,7 @@ void RelativeNavigation::update(const TimedElements& chief, const TimedElements&
     state_.chief_covariance = offset.covariance;
   }
   measure_relative(z, R, u, n);
+  if (reopenings_in_a_row_ >= kReopeningsToRestart) start(chief, z, R);
 }
 
 void RelativeNavigation::start(const TimedElements& chief, const RelativeElements& z,
@@ -154,6 +158,8 @@ void RelativeNavigation::start(const TimedElements& chief, const RelativeElement
                                                square(chief.sigma_r_m), square(chief.sigma_v_mps));
   state_.relative = {z, R};
   forget_burns_before(chief.t_ns);
+  reopenings_in_a_row_ = 0;
+  outliers_in_a_row_ = 0;
   started_ = true;
   ++updates_;
 }
@@ -162,6 +168,7 @@ void RelativeNavigation::measure_relative(const RelativeElements& z, const Matri
                                           double n_radps) {
   if (measure(&state_.relative, z, R, options_.gate)) {
     outliers_in_a_row_ = 0;
+    reopenings_in_a_row_ = 0;
     ++updates_;
     return;
   }
@@ -178,7 +185,10 @@ void RelativeNavigation::measure_relative(const RelativeElements& z, const Matri
         element_covariance(u_rad, n_radps, square(kReopened_r_m), square(kReopened_v_mps));
   }
   outliers_in_a_row_ = 0;
-  if (measure(&state_.relative, z, R, options_.gate)) ++updates_;
+  ++reopenings_in_a_row_;
+  if (!measure(&state_.relative, z, R, options_.gate)) return;
+  ++updates_;
+  reopenings_in_a_row_ = 0;
 }
 
 bool RelativeNavigation::can_predict(std::int64_t t_ns) const {

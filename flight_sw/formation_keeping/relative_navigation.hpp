@@ -110,7 +110,7 @@ class RelativeNavigation {
   int burn_count_ = 0;
   bool started_ = false;
   FormationState state_;
-  int outliers_in_a_row_ = 0;
+  int outliers_in_a_row_ = 0, reopenings_in_a_row_ = 0;
   bool burn_suspected_ = false;
   std::uint32_t updates_ = 0, outliers_ = 0;
 };

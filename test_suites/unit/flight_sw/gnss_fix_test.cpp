@@ -50,6 +50,15 @@ Bytes operator+(Bytes a, const Bytes& b) {
   return a;
 }
 
+TEST(GnssFixTest, AnOldSolutionUnderANewTimeIsARepetition) {
+  GnssFix later = some_fix();
+  EXPECT_FALSE(repeats(some_fix(), later)) << "the very same";
+  later.epoch_ns += 1000000000LL;
+  EXPECT_TRUE(repeats(some_fix(), later));
+  later.v_ECEF[2] += 0.001;
+  EXPECT_FALSE(repeats(some_fix(), later));
+}
+
 TEST(GnssFixTest, ReadsEveryField) {
   const Heard heard = parse(flight_test::bestxyz_frame(some_fix()));
   ASSERT_EQ(heard.fixes, 1);
