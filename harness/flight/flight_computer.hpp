@@ -14,6 +14,13 @@
 
 namespace orrery {
 
+/// A call of flight software in simulated time.
+struct CallSpan {
+  std::string_view what;  // the input port, "create" or "tick"
+  SimTime begin, end;     // its outputs leave at `end`, unless the process ends before
+  CallOutcome outcome = CallOutcome::kDone;
+};
+
 /// One processor with one process.
 ///
 /// Calls    An input is an event of Phase::kDelivery, the tick one of Phase::kTick. A call starts
@@ -39,6 +46,9 @@ class FlightComputer {
     std::function<void(LogLevel, std::string_view line)> on_log;
     std::function<void(const CrashReport&)> on_crash;
     std::function<void(const CallRecord&)> on_call;
+    std::function<void(const CallSpan&)> on_span;         // before on_call; not of `destroy`
+    std::function<void()> on_end;                         // a life of the process is over
+    std::function<void(std::string_view port)> on_drop;   // an input, as the queue was full
     std::function<double(std::uint64_t call)> slow_down;  // factor on the execution time; calls
                                                           // count from 1
     std::function<void()> on_power_cycle;                 // devices start cold

@@ -69,6 +69,7 @@ void FlightComputer::Impl::enqueue(std::uint32_t port, std::uint32_t payload) {
   if (waiting_.size() == kMostWaiting || waiting_bytes_ + bytes > kMostWaiting_bytes) {
     ++dropped[port];
     payloads_.give_back(payload);
+    if (hooks_.on_drop) hooks_.on_drop(ports[port].name);
     return;
   }
   waiting_bytes_ += bytes;
@@ -107,7 +108,8 @@ void FlightComputer::Impl::run_input(std::uint32_t port, std::uint32_t payload) 
          p.name + ", which takes " + std::to_string(p.max_bytes));
     return;
   }
-  end_call(timings_.input(port), process->input(loop_.now(), onboard_ns(), p, taken.bytes()));
+  end_call(timings_.input(port), p.name,
+           process->input(loop_.now(), onboard_ns(), p, taken.bytes()));
 }
 
 void FlightComputer::Impl::on_tick() {
@@ -124,7 +126,7 @@ void FlightComputer::Impl::on_tick() {
 void FlightComputer::Impl::run_tick() {
   tick_waits_ = false;
   if (!makes_progress()) return;
-  end_call(timings_.tick(), process->tick(loop_.now(), onboard_ns()));
+  end_call(timings_.tick(), "tick", process->tick(loop_.now(), onboard_ns()));
 }
 
 bool FlightComputer::Impl::makes_progress() {
@@ -155,7 +157,8 @@ void FlightComputer::Impl::on_output(std::uint32_t port, std::uint32_t payload,
 // ---- after a call
 
 // The call has run on the host; in simulated time it begins now.
-void FlightComputer::Impl::end_call(const internal::CallTiming& timing, CallOutcome outcome) {
+void FlightComputer::Impl::end_call(const internal::CallTiming& timing, std::string_view what,
+                                    CallOutcome outcome) {
   ++calls;
   Duration time = timing.execution.of_call(timing.execution_draws, process->work());
   if (hooks_.slow_down) {
@@ -163,6 +166,7 @@ void FlightComputer::Impl::end_call(const internal::CallTiming& timing, CallOutc
     if (factor != 1) time = from_seconds(to_seconds(time) * factor);
   }
   busy_until_ = loop_.now() + time + process->virtual_time_spent();
+  if (hooks_.on_span) hooks_.on_span({what, loop_.now(), busy_until_, outcome});
   take_over(outcome);
 }
 

@@ -65,7 +65,7 @@ class FlightComputer::Impl {
   void on_input(std::uint32_t port, std::uint32_t payload);
   void on_tick();
   void on_output(std::uint32_t port, std::uint32_t payload, std::uint32_t life);
-  void end_call(const internal::CallTiming& timing, CallOutcome outcome);
+  void end_call(const internal::CallTiming& timing, std::string_view what, CallOutcome outcome);
 
   void on_boot(ResetCause cause);
   void on_reset(const EventKind& kind, ResetCause cause, Duration boot_delay);

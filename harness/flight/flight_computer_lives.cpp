@@ -36,7 +36,8 @@ void FlightComputer::Impl::on_boot(ResetCause cause) {
   }
   if (boots > 0) load_afresh();
   const auto boot_count = static_cast<std::uint32_t>(boots++);
-  end_call(timings_.create(), process->create(loop_.now(), onboard_ns(), boot_count, cause));
+  end_call(timings_.create(), "create",
+           process->create(loop_.now(), onboard_ns(), boot_count, cause));
 }
 
 void FlightComputer::Impl::on_boot_loop() {
@@ -112,6 +113,7 @@ void FlightComputer::Impl::end_life() {
   ++life_;
   died_ = loop_.now();
   lose_what_waits();
+  if (hooks_.on_end) hooks_.on_end();
 }
 
 void FlightComputer::Impl::lose_what_waits() {
