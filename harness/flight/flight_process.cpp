@@ -2,6 +2,7 @@
 #include <orrery/harness/flight/library_closure.hpp>
 #include <orrery/harness/flight/port_table.hpp>
 #include <orrery/harness/flight/stack_frames.hpp>
+#include <orrery/harness/kernel/hash.hpp>
 #include <orrery/harness/kernel/random.hpp>
 #include <orrery/harness/kernel/text.hpp>
 
@@ -212,6 +213,9 @@ CallOutcome FlightProcess::Impl::call(CallArguments arguments, SimTime truth, By
   arguments_ = arguments;
   services.begin_call(truth, arguments.onboard_ns, arguments.call == Call::kCreate);
   begin_call();
+  if (options.heap.fill && stack != nullptr) {
+    stack->overwrite_used(hash_word(options.heap.seed, calls));
+  }
   stopwatch.start();
   const bool returned = internal::run_contained(
       contained_, [](void* self) { static_cast<Impl*>(self)->run_library_call(); }, this, capture_);

@@ -1,4 +1,5 @@
 #include <orrery/harness/flight/flight_stack.hpp>
+#include <orrery/harness/kernel/hash.hpp>
 
 #include <bitset>
 #include <cerrno>
@@ -133,6 +134,16 @@ std::uint64_t FlightStack::high_water_bytes() const {
     }
   }
   return 0;
+}
+
+void FlightStack::overwrite_used(std::uint64_t seed) {
+  constexpr std::uint64_t kWord_bytes = sizeof(std::uint64_t);
+  std::byte* const top = bottom_ + bytes_;
+  const std::uint64_t words = high_water_bytes() / kWord_bytes;  // whole ones: the rest stays zero
+  for (std::uint64_t i = 1; i <= words; ++i) {
+    const std::uint64_t drawn = hash_word(seed, i);
+    std::memcpy(top - i * kWord_bytes, &drawn, kWord_bytes);
+  }
 }
 
 void FlightStack::call(void (*function)(void*), void* argument) const {

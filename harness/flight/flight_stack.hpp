@@ -29,6 +29,9 @@ class FlightStack {
   /// Most that was in use so far, to the byte: from the top to the lowest byte that is not zero.
   /// Costs a look at every page in use.
   std::uint64_t high_water_bytes() const;
+  /// Between calls: what they have left behind becomes bytes drawn from `seed`, so that code that
+  /// reads a variable before it has written it does not find the same as in another run.
+  void overwrite_used(std::uint64_t seed);
   /// function(argument), on this stack.
   void call(void (*function)(void*), void* argument) const;
 

@@ -327,5 +327,41 @@ TEST(CrashReportTest, PrintsWhatIsKnown) {
                              HasSubstr("fault")));
 }
 
+// What a call finds on the stack of what the last one left: the byte at that depth.
+struct Peek {
+  volatile unsigned char found = 0;
+  bool writes = false;
+};
+void peek(void* to) {
+  volatile unsigned char local[4096];
+  volatile unsigned char* unwritten = local;
+  asm volatile("" : "+r"(unwritten) : : "memory");  // the compiler is not to see what this reads
+  auto* p = static_cast<Peek*>(to);
+  p->found = unwritten[2000];
+  for (int i = 0; i < 4096 && p->writes; ++i) unwritten[i] = 0x5a;
+}
+
+TEST(FlightStackTest, WhatCallsHaveLeftBecomesOtherBytesAndNoMore) {
+  if (!internal::FlightStack::available()) GTEST_SKIP() << "calls run on the caller's stack";
+  const auto found_after = [](std::uint64_t seed) {
+    internal::FlightStack stack(internal::FlightStack::kLeast_bytes);
+    stack.overwrite_used(seed);  // nothing was used
+    EXPECT_EQ(stack.high_water_bytes(), 0u);
+    Peek first{.writes = true}, second;
+    stack.call(peek, &first);
+    EXPECT_EQ(first.found, 0);
+    const std::uint64_t used = stack.high_water_bytes();
+    EXPECT_GT(used, 4000u);
+    if (seed != 0) stack.overwrite_used(seed);
+    EXPECT_LE(stack.high_water_bytes(), used);
+    EXPECT_GT(stack.high_water_bytes(), used - 16);
+    stack.call(peek, &second);
+    return static_cast<int>(second.found);
+  };
+  EXPECT_EQ(found_after(0), 0x5a);
+  EXPECT_NE(found_after(1), 0x5a);
+  EXPECT_NE(found_after(1), found_after(2));  // drawn: one in 256 seeds would be the same
+}
+
 }  // namespace
 }  // namespace orrery
