@@ -143,6 +143,7 @@ const FlightTarget kFlightTargets[] = {
 ${table}};
 const bool kRegistered = [] {
   for (const FlightTarget& t : kFlightTargets) orrery::register_flight_target(t.name, t.path);
+  orrery::register_source_folder(R\"~(${CMAKE_CURRENT_SOURCE_DIR})~\");
   return true;
 }();
 }  // namespace

@@ -12,6 +12,16 @@ SimTime CallTiming::with_jitter(SimTime t) {
   return latest;
 }
 
+void CallTiming::count(std::uint64_t ticks_of_host, Duration execution_time, std::uint64_t edges) {
+  ++calls;
+  host_ticks += ticks_of_host;
+  most_host_ticks = std::max(most_host_ticks, ticks_of_host);
+  modelled += execution_time;
+  most_modelled = std::max(most_modelled, execution_time);
+  work += edges;
+  most_work = std::max(most_work, edges);
+}
+
 CallTimings::CallTimings(const FlightProcessOptions& options, const std::vector<FlightPort>& ports,
                          bool counts_work)
     : counts_work_(counts_work), inputs_(ports.size()) {
@@ -64,6 +74,26 @@ void CallTimings::set_jitter(CallTiming& timing, const FlightProcessOptions& opt
   }
   timing.jitter = jitter;
   timing.jitter_draws = &stream(options, "scheduling_jitter " + what);
+}
+
+std::vector<CallFigures> CallTimings::figures(const std::vector<FlightPort>& ports,
+                                              const HostStopwatch& stopwatch) const {
+  std::vector<CallFigures> rows;
+  const auto add = [&](const std::string& call, const CallTiming& t) {
+    if (t.calls == 0) return;
+    rows.push_back({.call = call,
+                    .calls = t.calls,
+                    .host_mean = stopwatch.duration(t.host_ticks / t.calls),
+                    .host_max = stopwatch.duration(t.most_host_ticks),
+                    .modelled_mean = t.modelled / static_cast<std::int64_t>(t.calls),
+                    .modelled_max = t.most_modelled,
+                    .work_mean = t.work / t.calls,
+                    .work_max = t.most_work});
+  };
+  add("create", create_);
+  for (std::size_t i = 0; i < ports.size(); ++i) add(ports[i].name, inputs_[i]);
+  add("tick", tick_);
+  return rows;
 }
 
 }  // namespace orrery::internal

@@ -1,8 +1,10 @@
 /// When a call begins and how long it keeps its processor, by kind of call.
 #pragma once
 
+#include <orrery/harness/flight/call_figures.hpp>
 #include <orrery/harness/flight/flight_options.hpp>
 #include <orrery/harness/flight/flight_process.hpp>
+#include <orrery/harness/flight/host_stopwatch.hpp>
 #include <orrery/harness/kernel/random.hpp>
 
 #include <cstdint>
@@ -20,8 +22,13 @@ struct CallTiming {
   RandomStream* jitter_draws = nullptr;
   SimTime latest;  // start so far: nobody of the same kind overtakes
 
+  // Of the calls so far.
+  std::uint64_t calls = 0, host_ticks = 0, most_host_ticks = 0, work = 0, most_work = 0;
+  Duration modelled{0}, most_modelled{0};
+
   /// When one begins that was due at `t`.
   SimTime with_jitter(SimTime t);
+  void count(std::uint64_t ticks_of_host, Duration execution_time, std::uint64_t edges);
 };
 
 class CallTimings {
@@ -34,6 +41,10 @@ class CallTimings {
   CallTiming& create() { return create_; }
   CallTiming& tick() { return tick_; }
   CallTiming& input(std::uint32_t port) { return inputs_[port]; }
+
+  /// Of every kind of call that has been made: create, inputs by port, tick.
+  std::vector<CallFigures> figures(const std::vector<FlightPort>& ports,
+                                   const HostStopwatch& stopwatch) const;
 
  private:
   RandomStream& stream(const FlightProcessOptions& options, const std::string& purpose);

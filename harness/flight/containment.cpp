@@ -14,6 +14,7 @@
 #include <cxxabi.h>
 #include <exception>
 #include <fcntl.h>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <pthread.h>
@@ -299,6 +300,37 @@ bool keep_exit_function(void (*function)(void*), void* argument) {
   return true;
 }
 
+// Guards of statics within whose constructors a process crashed -> what to say of it.
+std::map<const void*, std::string>& half_initialised() {
+  static std::map<const void*, std::string> guards;
+  return guards;
+}
+
+void static_wanted(const void* guard) {
+  if (running_call == nullptr || !in_flight_code) return;
+  char reason[sizeof CrashCapture::message] = "";
+  {
+    const SimulatorScope scope;
+    const auto found = half_initialised().find(guard);
+    if (found != half_initialised().end()) {
+      std::snprintf(reason, sizeof reason, "%s", found->second.c_str());
+    }
+  }
+  if (reason[0] != 0) end_running_call(CrashKind::kForbiddenCall, reason);
+}
+
+void static_begun(const void* guard) {
+  if (running_call == nullptr || !in_flight_code) return;
+  const SimulatorScope scope;
+  running_call->process->statics_begun.push_back(guard);
+}
+
+void static_ended(const void* guard) {
+  if (running_call == nullptr || !in_flight_code) return;
+  const SimulatorScope scope;
+  std::erase(running_call->process->statics_begun, guard);
+}
+
 int call_stack(void** frames, int most) {
   if (running_call == nullptr) return 0;
   CrashCapture capture;
@@ -311,7 +343,8 @@ int call_stack(void** frames, int most) {
   return count;
 }
 
-constexpr ProcessHooks kProcessHooks = {keep_exit_function, on_exit_called, call_stack};
+constexpr ProcessHooks kProcessHooks = {keep_exit_function, on_exit_called, static_wanted,
+                                        static_begun,       static_ended,   call_stack};
 
 // ---- set-up
 
@@ -466,6 +499,10 @@ bool flight_code_is_running() {
 
 ContainedProcess* running_process() {
   return running_call == nullptr ? nullptr : running_call->process;
+}
+
+void mark_half_initialised(const void* guard, const std::string& reason) {
+  half_initialised()[guard] = reason;
 }
 
 void end_running_call(CrashKind kind, const char* message) {

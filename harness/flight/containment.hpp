@@ -7,6 +7,7 @@
 #include <orrery/harness/heap/simulated_heap.hpp>
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 namespace orrery::internal {
@@ -39,7 +40,8 @@ struct ContainedProcess {
   FileServices* files = nullptr;        // likewise
   std::int64_t host_limit_ns = 0;       // of thread CPU time in one call; 0: none
   std::vector<ExitFunction> exit_functions;
-  bool changed_floating_point = false;  // set when a call left the control registers changed
+  std::vector<const void*> statics_begun;  // guards of those whose constructors are running
+  bool changed_floating_point = false;     // set when a call left the control registers changed
 };
 
 /// Runs function(argument) as flight code. True if it returned; false if it crashed, and then
@@ -62,6 +64,10 @@ bool flight_code_is_running();
 
 /// The process whose call is on this thread's stack, or null.
 ContainedProcess* running_process();
+
+/// From now on whoever wants the static of that guard crashes, for the reason given. The guard's
+/// library must stay loaded.
+void mark_half_initialised(const void* guard, const std::string& reason);
 
 /// Ends the call of flight code that is running now, as a crash. Returns only if none is.
 void end_running_call(CrashKind kind, const char* message);

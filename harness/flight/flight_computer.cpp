@@ -96,6 +96,12 @@ std::int64_t FlightComputer::onboard_ns() const {
 OnboardClock& FlightComputer::clock() {
   return impl_->clock;
 }
+void FlightComputer::run(const std::function<void()>& function) {
+  impl_->run(function);
+}
+std::vector<CallFigures> FlightComputer::call_figures() const {
+  return impl_->call_figures();
+}
 Duration FlightComputer::host_time_in_flight() const {
   return impl_->host_time();
 }

@@ -1,6 +1,7 @@
 /// Binds a flight process to the event loop: inputs, ticks, outputs, the processor's time.
 #pragma once
 
+#include <orrery/harness/flight/call_figures.hpp>
 #include <orrery/harness/flight/flight_process.hpp>
 #include <orrery/harness/flight/onboard_clock.hpp>
 #include <orrery/harness/kernel/event_loop.hpp>
@@ -116,6 +117,11 @@ class FlightComputer {
   NonVolatileMemory& memory();
   std::int64_t onboard_ns() const;  // what the spacecraft's clock shows now
   OnboardClock& clock();
+  /// Runs a function as flight code of this process, now: FlightProcess::run. Its outputs leave
+  /// when the processor is free. @throws std::logic_error  it is not running.
+  void run(const std::function<void()>& function);
+  /// By kind of call, of all lives: calls, host time, modelled time, work.
+  std::vector<CallFigures> call_figures() const;
   Duration host_time_in_flight() const;  // for reports only
 
  private:

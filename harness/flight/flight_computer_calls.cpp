@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <orrery_flight.h>
+#include <stdexcept>
 
 namespace orrery {
 namespace {
@@ -157,7 +158,7 @@ void FlightComputer::Impl::on_output(std::uint32_t port, std::uint32_t payload,
 // ---- after a call
 
 // The call has run on the host; in simulated time it begins now.
-void FlightComputer::Impl::end_call(const internal::CallTiming& timing, std::string_view what,
+void FlightComputer::Impl::end_call(internal::CallTiming& timing, std::string_view what,
                                     CallOutcome outcome) {
   ++calls;
   Duration time = timing.execution.of_call(timing.execution_draws, process->work());
@@ -165,9 +166,20 @@ void FlightComputer::Impl::end_call(const internal::CallTiming& timing, std::str
     const double factor = hooks_.slow_down(calls);
     if (factor != 1) time = from_seconds(to_seconds(time) * factor);
   }
-  busy_until_ = loop_.now() + time + process->virtual_time_spent();
+  time += process->virtual_time_spent();
+  timing.count(process->last_host_ticks(), time, process->work());
+  busy_until_ = loop_.now() + time;
   if (hooks_.on_span) hooks_.on_span({what, loop_.now(), busy_until_, outcome});
   take_over(outcome);
+}
+
+// Beside what the processor is modelled to do: it takes no simulated time.
+void FlightComputer::Impl::run(const std::function<void()>& function) {
+  if (!alive()) {
+    throw std::logic_error("FlightComputer::run: " + process_name(options) + " is not running");
+  }
+  busy_until_ = std::max(busy_until_, loop_.now());
+  take_over(process->run(loop_.now(), onboard_ns(), function));
 }
 
 // State first, then hooks: they may throw.

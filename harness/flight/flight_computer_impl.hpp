@@ -7,6 +7,7 @@
 #include <orrery/harness/flight/port_table.hpp>
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -43,6 +44,8 @@ class FlightComputer::Impl {
   std::int64_t onboard_ns() const { return clock.onboard_ns(loop_.now()); }
   bool alive() const { return process != nullptr && process->alive(); }
   HeapFigures heap() const;
+  void run(const std::function<void()>& function);
+  std::vector<CallFigures> call_figures() const { return timings_.figures(ports, stopwatch_); }
   Duration host_time() const;
 
   FlightProcessOptions options;
@@ -65,7 +68,7 @@ class FlightComputer::Impl {
   void on_input(std::uint32_t port, std::uint32_t payload);
   void on_tick();
   void on_output(std::uint32_t port, std::uint32_t payload, std::uint32_t life);
-  void end_call(const internal::CallTiming& timing, std::string_view what, CallOutcome outcome);
+  void end_call(internal::CallTiming& timing, std::string_view what, CallOutcome outcome);
 
   void on_boot(ResetCause cause);
   void on_reset(const EventKind& kind, ResetCause cause, Duration boot_delay);
@@ -99,6 +102,7 @@ class FlightComputer::Impl {
   internal::PayloadPool payloads_;
 
   internal::CallTimings timings_;
+  internal::HostStopwatch stopwatch_;  // for the length of a tick only
 
   // Of earlier lives.
   std::uint64_t high_water_before_ = 0;

@@ -1,6 +1,7 @@
 #include <orrery/harness/flight/flight_library.hpp>
 #include <orrery/harness/flight/floating_point.hpp>
 #include <orrery/harness/flight/library_closure.hpp>
+#include <orrery/harness/flight/program_links.hpp>
 #include <orrery/harness/kernel/hash.hpp>
 #include <orrery/harness/kernel/text.hpp>
 #include <orrery/harness/kernel/time.hpp>
@@ -211,6 +212,21 @@ void register_flight_target(const char* name, const char* path) {
   known_targets()[name] = path;
 }
 
+namespace {
+std::string& known_source_folder() {
+  static std::string folder;
+  return folder;
+}
+}  // namespace
+
+void register_source_folder(const char* path) {
+  known_source_folder() = path;
+}
+
+std::string source_folder() {
+  return known_source_folder();
+}
+
 std::string find_flight_library(const std::string& name) {
   if (name.empty() || name.find('/') != std::string::npos) {
     throw std::invalid_argument("flight library \"" + name +
@@ -264,6 +280,14 @@ void FlightLibrary::unload() {
 void FlightLibrary::make_copy(const FlightProcessOptions& options) {
   internal::LibraryClosure closure = internal::read_closure(path_);
   shared_dependencies_ = closure.shared;
+  for (const internal::LibraryPart& part : closure.parts) {
+    if (!internal::program_links(part.path)) continue;
+    throw std::invalid_argument(
+        "under Isolation::kCopy each process has a copy of its own, but the test program " +
+        internal::program_path() + " itself links " + part.path +
+        ", and what a program links is one for all copies; do not link it, or fly it with "
+        "Isolation::kShared");
+  }
   ByteBuffer all;
   for (internal::LibraryPart& part : closure.parts) {
     for (const std::string& symbol : part.image.make_unique_symbols_weak()) {

@@ -13,6 +13,10 @@ namespace orrery {
 /// Makes a library known by name. orrery_add_test writes the calls; they run before main.
 void register_flight_target(const char* name, const char* path);
 
+/// Where the sources of the test program lie: orrery_add_test writes the call. Empty: not known.
+void register_source_folder(const char* path);
+std::string source_folder();
+
 /// The file of a library: lib<name>.so or <name>.so in the folders of ORRERY_FLIGHT_PATH, separated
 /// by colons, else what register_flight_target knows.
 /// @throws std::invalid_argument  not found; the message says where it looked and what is known.

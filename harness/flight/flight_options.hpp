@@ -2,16 +2,22 @@
 #pragma once
 
 #include <orrery/harness/flight/execution_time.hpp>
+#include <orrery/harness/flight/flight_port.hpp>
 #include <orrery/harness/heap/heap_options.hpp>
 #include <orrery/harness/kernel/time.hpp>
 
 #include <cstdint>
+#include <functional>
 #include <map>
+#include <memory>
 #include <string>
+#include <vector>
 
 namespace orrery {
 
 class RandomStreams;
+class FlightAdapter;
+class Process;
 
 enum class Isolation : std::uint8_t {
   kCopy,    // a private copy of the library: each process has its own globals
@@ -48,6 +54,10 @@ struct FlightProcessOptions {
   int heap_alignment = 16;                // 16 (the host's ABI) or 8 (the paper's)
   HeapRules heap = {};                    // policy, checks
   HeapExhaustion heap_exhaustion = HeapExhaustion::kNull;
+  /// Instead of the ABI's entry, which the library then need not have (flight_adapter.hpp); the
+  /// ids of the ports are of no account.
+  std::function<std::unique_ptr<FlightAdapter>(Process&)> adapter = {};
+  std::vector<FlightPort> adapter_ports = {};
   std::uint64_t storage_bytes = 1'048'576;        // non-volatile, all slots together
   std::map<std::string, std::string> files = {};  // see FlightFiles
   OtherFiles other_files = OtherFiles::kRefuse;

@@ -21,7 +21,7 @@ using internal::CallArguments;
 using Call = internal::LibraryCall;
 
 const char* call_name(Call call) {
-  static constexpr const char* kNames[] = {"load", "create", "input", "tick", "destroy"};
+  static constexpr const char* kNames[] = {"load", "create", "input", "tick", "destroy", "run"};
   return kNames[static_cast<int>(call)];
 }
 
@@ -98,7 +98,9 @@ void FlightProcess::Impl::load() {
     throw std::invalid_argument("flight library \"" + options.library + "\" (" + library->path() +
                                 "): " + reason);
   };
-  if (library->symbol("orrery_flight_entry") == nullptr) {
+  if (options.adapter) {
+    adapter.emplace(options);
+  } else if (library->symbol("orrery_flight_entry") == nullptr) {
     refuse(
         "it does not export orrery_flight_entry, by which flight software is entered; is it linked "
         "from orrery_flight.h, and with that symbol visible?");
@@ -173,7 +175,8 @@ void FlightProcess::Impl::run_library_call() {
     case Call::kLoad: {
       using Entry = const orrery_flight* (*)();
       library->run_constructors();
-      flight = reinterpret_cast<Entry>(library->symbol("orrery_flight_entry"))();
+      flight = adapter ? adapter->flight()
+                       : reinterpret_cast<Entry>(library->symbol("orrery_flight_entry"))();
       return;
     }
     case Call::kCreate:
@@ -187,6 +190,9 @@ void FlightProcess::Impl::run_library_call() {
       return;
     case Call::kDestroy:
       flight->destroy(self_);
+      return;
+    case Call::kRun:
+      (*a.function)();
       return;
   }
 }
@@ -307,8 +313,28 @@ void FlightProcess::Impl::die(CrashKind kind, std::string message, SimTime truth
   crash.backtrace = internal::stack_frames(capture_, library->loaded_paths());
   capture_.frame_count = 0;
   if (kind == CrashKind::kHeapFault) tell_of_block(fault_address_);
-
+  mark_half_initialised();
   cut_off();
+}
+
+// In a copy they go with it.
+void FlightProcess::Impl::mark_half_initialised() {
+  std::vector<const void*> guards;
+  guards.swap(contained_.statics_begun);
+  if (options.isolation != Isolation::kShared || guards.empty()) return;
+  library->keep_loaded();
+  for (const void* guard : guards) {
+    std::string what = "its name is not known";
+    for (const internal::GlobalsWatch& watch : globals) {
+      const std::string found = watch.name_of(static_cast<const std::byte*>(guard));
+      if (!found.starts_with("the byte")) what = found;
+    }
+    internal::mark_half_initialised(
+        guard, "flight library \"" + options.library + "\" cannot be used any more: " + name +
+                   " crashed while it initialised a static, which all its processes share under "
+                   "Isolation::kShared (" +
+                   what + ")");
+  }
 }
 
 void FlightProcess::Impl::cut_off() {
@@ -498,6 +524,16 @@ CallOutcome FlightProcess::tick(SimTime truth, std::int64_t onboard_ns) {
   return impl_->call({.call = Call::kTick, .onboard_ns = onboard_ns}, truth, {});
 }
 
+CallOutcome FlightProcess::run(SimTime truth, std::int64_t onboard_ns,
+                               const std::function<void()>& function) {
+  impl_->require_alive("run");
+  return impl_->call({.call = Call::kRun, .onboard_ns = onboard_ns, .function = &function}, truth,
+                     {});
+}
+void* FlightProcess::symbol(const char* symbol_name) const {
+  return impl_->library->symbol(symbol_name);
+}
+
 CallOutcome FlightProcess::shut_down(SimTime truth, std::int64_t onboard_ns) {
   impl_->require_alive("shut_down");
   const CallOutcome outcome =
@@ -602,6 +638,9 @@ const std::vector<std::string>& FlightProcess::shared_dependencies() const {
 }
 Duration FlightProcess::host_time_in_flight() const {
   return impl_->stopwatch.total();
+}
+std::uint64_t FlightProcess::last_host_ticks() const {
+  return impl_->stopwatch.last_ticks();
 }
 
 }  // namespace orrery

@@ -4,6 +4,7 @@
 
 #include <orrery/harness/flight/crash_report.hpp>
 #include <orrery/harness/flight/flight_options.hpp>
+#include <orrery/harness/flight/flight_port.hpp>
 #include <orrery/harness/flight/non_volatile_memory.hpp>
 #include <orrery/harness/heap/heap_figures.hpp>
 #include <orrery/harness/heap/heap_history.hpp>
@@ -11,6 +12,7 @@
 #include <orrery/harness/kernel/time.hpp>
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -18,22 +20,9 @@
 #include <utility>
 #include <vector>
 
+struct orrery_host;
+
 namespace orrery {
-
-enum class PortDirection : std::uint8_t { kIn, kOut };
-enum class PortKind : std::uint8_t { kPacket, kStream };
-
-/// A row of a library's port table.
-struct FlightPort {
-  std::string name;
-  PortDirection direction = PortDirection::kIn;
-  PortKind kind = PortKind::kPacket;
-  std::uint32_t id = 0;         // the library's own number
-  std::uint32_t max_bytes = 0;  // of one call
-};
-
-/// Levels of log lines, as the ABI numbers them.
-enum class LogLevel : std::int32_t { kDebug = 0, kInfo = 1, kWarning = 2, kError = 3 };
 
 /// Why a process boots, as the ABI numbers it.
 enum class ResetCause : std::uint8_t { kPowerOn = 0, kCommanded = 1, kWatchdog = 2, kCrash = 3 };
@@ -60,6 +49,11 @@ enum class FlightMemory : std::uint8_t {
   kHeap,     // from the first block to the top, headers and free blocks too
   kGlobals,  // .data and .bss of the library itself
 };
+
+namespace internal {
+struct AdaptedProcess;
+AdaptedProcess adapted_process(const ::orrery_host* host);
+}  // namespace internal
 
 /// Runs flight code to completion and keeps it from the simulator, and the simulator from it.
 ///
@@ -93,6 +87,13 @@ class FlightProcess {
                      ResetCause cause = ResetCause::kPowerOn);
   CallOutcome input(SimTime truth, std::int64_t onboard_ns, const FlightPort& port, Bytes data);
   CallOutcome tick(SimTime truth, std::int64_t onboard_ns);
+  /// Any function, as flight code of this process: in its heap, contained, with its clock, and
+  /// with outputs and a tick request like any other call. After a crash in it the destructors of
+  /// what lived on its stack have not run; what it allocated and left to others is gone with the
+  /// process.
+  CallOutcome run(SimTime truth, std::int64_t onboard_ns, const std::function<void()>& function);
+  /// What the library exports under that name; null: nothing, or it is off.
+  void* symbol(const char* name) const;
   /// Orderly end: destroy, then the library's static destructors.
   CallOutcome shut_down(SimTime truth, std::int64_t onboard_ns);
 
@@ -163,9 +164,11 @@ class FlightProcess {
 
   /// Host time spent within calls, for reports only: it repeats in no run.
   Duration host_time_in_flight() const;
+  std::uint64_t last_host_ticks() const;  // of the last call, for HostStopwatch::duration()
 
  private:
   class Impl;
+  friend internal::AdaptedProcess internal::adapted_process(const ::orrery_host* host);
   std::unique_ptr<Impl> impl_;
 };
 

@@ -2,6 +2,7 @@
 /// host.
 #pragma once
 
+#include <orrery/harness/flight/adapter_bridge.hpp>
 #include <orrery/harness/flight/containment.hpp>
 #include <orrery/harness/flight/file_services.hpp>
 #include <orrery/harness/flight/flight_library.hpp>
@@ -11,7 +12,9 @@
 #include <orrery/harness/flight/virtual_services.hpp>
 
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <orrery_flight.h>
 #include <orrery_work.h>
 #include <string>
@@ -21,7 +24,7 @@
 namespace orrery {
 namespace internal {
 
-enum class LibraryCall : std::uint8_t { kLoad, kCreate, kInput, kTick, kDestroy };
+enum class LibraryCall : std::uint8_t { kLoad, kCreate, kInput, kTick, kDestroy, kRun };
 
 // What a call of the library needs, as plain data: the other side of the boundary reads it.
 struct CallArguments {
@@ -30,6 +33,7 @@ struct CallArguments {
   const orrery_boot* boot = nullptr;
   const FlightPort* port = nullptr;
   std::uint32_t bytes = 0;
+  const std::function<void()>* function = nullptr;
   std::int32_t status = ORRERY_OK;  // result
 };
 
@@ -48,6 +52,7 @@ class FlightProcess::Impl {
   std::string check_heap();
   std::vector<LeakReport> leaks(std::uint64_t after, std::uint64_t until) const;
   void require_alive(const char* function) const;
+  internal::AdaptedProcess adapted() const { return {&options, library.get(), &ports}; }
   void require_between_calls(const char* function) const;
   void die_of_last_call(SimTime truth);
   void die(CrashKind kind, std::string message, SimTime truth,
@@ -63,6 +68,7 @@ class FlightProcess::Impl {
   FlightProcessOptions options;
   std::string name;
   std::vector<FlightPort> ports;
+  std::optional<internal::AdapterTable> adapter;
   const orrery_flight* flight = nullptr;
   std::unique_ptr<SimulatedHeap> heap;           // null where heaps are not simulated
   std::unique_ptr<internal::FlightStack> stack;  // null: calls run on the caller's
@@ -72,7 +78,7 @@ class FlightProcess::Impl {
   std::unique_ptr<FlightLibrary> library;  // unloaded while all of the above is still there
   orrery_work* work = nullptr;             // of the library; null: it counts none
 
-  std::vector<internal::GlobalsWatch> globals;  // Isolation::kShared; the library's own first
+  std::vector<internal::GlobalsWatch> globals;    // Isolation::kShared; the library's own first
   std::vector<std::string> watched_dependencies;  // names of the others
   std::string written_global;
   std::uint64_t calls = 0;
@@ -112,6 +118,7 @@ class FlightProcess::Impl {
   std::vector<StackFrame> frames(const CallStack& stack) const;
   void report_written_global();
   void watch_globals();
+  void mark_half_initialised();
   bool calling() const { return internal::running_process() == &contained_; }
   std::uint32_t find_output(std::uint32_t id) const;
   static void on_heap_fault(void* self, const HeapFault& fault);

@@ -24,13 +24,14 @@ class GlobalsWatch {
   /// none has.
   std::string changed() const;
   std::size_t bytes() const;
+  /// Of the variable at an address of the library.
+  std::string name_of(const std::byte* address) const;
 
  private:
   struct Range {
     const std::byte* begin;
     std::vector<std::byte> content;
   };
-  std::string name_of(const std::byte* address) const;
 
   ElfImage image_;
   std::uintptr_t base_;

@@ -103,4 +103,9 @@ std::int32_t FlightProcess::Impl::store_slot(std::uint32_t slot, const void* dat
   return memory->store(slot, staging_) ? ORRERY_OK : ORRERY_TOO_SMALL;
 }
 
+// The table lies within the process that its context names.
+internal::AdaptedProcess internal::adapted_process(const orrery_host* host) {
+  return static_cast<FlightProcess::Impl*>(host->context)->adapted();
+}
+
 }  // namespace orrery

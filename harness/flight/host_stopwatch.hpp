@@ -16,14 +16,20 @@ namespace orrery::internal {
 class HostStopwatch {
  public:
   void start() { started_ = ticks(); }
-  void stop() { sum_ += ticks() - started_; }
-  Duration total() const {
+  void stop() {
+    last_ = ticks() - started_;
+    sum_ += last_;
+  }
+  std::uint64_t last_ticks() const { return last_; }
+  Duration total() const { return duration(sum_); }
+  /// Of so many ticks of any stopwatch, by what this one has seen since it was made.
+  Duration duration(std::uint64_t of_ticks) const {
     const double elapsed_ticks = static_cast<double>(ticks() - first_ticks_);
     if (elapsed_ticks <= 0.0) return Duration{0};
     const std::chrono::duration<double, std::nano> elapsed =
         std::chrono::steady_clock::now() - first_time_;
     return Duration(
-        static_cast<std::int64_t>(elapsed.count() * static_cast<double>(sum_) / elapsed_ticks));
+        static_cast<std::int64_t>(elapsed.count() * static_cast<double>(of_ticks) / elapsed_ticks));
   }
 
  private:
@@ -36,7 +42,7 @@ class HostStopwatch {
   }
   std::chrono::steady_clock::time_point first_time_ = std::chrono::steady_clock::now();
   std::uint64_t first_ticks_ = ticks();
-  std::uint64_t started_ = 0, sum_ = 0;
+  std::uint64_t started_ = 0, last_ = 0, sum_ = 0;
 };
 
 }  // namespace orrery::internal

@@ -200,6 +200,48 @@ ORRERY_HOOK void exit(int status) noexcept {
   __builtin_unreachable();
 }
 
+// ---- statics of functions
+
+// A crash within the constructor of one leaves its guard taken, and who wants it next would wait
+// for ever. No static variables of our own in here.
+namespace {
+
+template <class Function>
+void find_system(Function*& function, const char* name) {
+  if (function == nullptr) function = reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name));
+}
+
+using GuardAcquire = int(long long*);
+using GuardRelease = void(long long*);
+constinit GuardAcquire* system_guard_acquire = nullptr;
+constinit GuardRelease* system_guard_release = nullptr;
+constinit GuardRelease* system_guard_abort = nullptr;
+
+}  // namespace
+
+ORRERY_HOOK int __cxa_guard_acquire(long long* guard) {
+  const orrery::internal::ProcessHooks* hooks = orrery::internal::process_hooks;
+  if (hooks != nullptr) hooks->static_wanted(guard);
+  find_system(system_guard_acquire, "__cxa_guard_acquire");
+  const int ours = system_guard_acquire(guard);
+  if (hooks != nullptr && ours != 0) hooks->static_begun(guard);
+  return ours;
+}
+
+ORRERY_HOOK void __cxa_guard_release(long long* guard) {
+  find_system(system_guard_release, "__cxa_guard_release");
+  system_guard_release(guard);
+  const orrery::internal::ProcessHooks* hooks = orrery::internal::process_hooks;
+  if (hooks != nullptr) hooks->static_ended(guard);
+}
+
+ORRERY_HOOK void __cxa_guard_abort(long long* guard) {
+  find_system(system_guard_abort, "__cxa_guard_abort");
+  system_guard_abort(guard);
+  const orrery::internal::ProcessHooks* hooks = orrery::internal::process_hooks;
+  if (hooks != nullptr) hooks->static_ended(guard);
+}
+
 // ---- self-test
 
 extern "C" bool orrery_allocator_simulates() {
@@ -227,6 +269,9 @@ extern "C" const char* orrery_allocator_hook_not_taken(std::size_t index) {
       {"__cxa_atexit", reinterpret_cast<void*>(&__cxa_atexit)},
       {"__cxa_thread_atexit_impl", reinterpret_cast<void*>(&__cxa_thread_atexit_impl)},
       {"exit", reinterpret_cast<void*>(&exit)},
+      {"__cxa_guard_acquire", reinterpret_cast<void*>(&__cxa_guard_acquire)},
+      {"__cxa_guard_release", reinterpret_cast<void*>(&__cxa_guard_release)},
+      {"__cxa_guard_abort", reinterpret_cast<void*>(&__cxa_guard_abort)},
   };
   for (const Hook& hook : hooks) {
     // The search that binds a library loaded with RTLD_LOCAL begins in the same place.

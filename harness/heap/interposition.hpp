@@ -42,6 +42,11 @@ struct ProcessHooks {
   bool (*register_exit)(void (*function)(void*), void* argument);
   /// Returns if no flight code is running.
   void (*exit)(int status);
+  /// A static of a function is about to be initialised: `wanted` may end the call, where a process
+  /// crashed within its constructor; `begun` by this thread; `ended`, by an exception too.
+  void (*static_wanted)(const void* guard);
+  void (*static_begun)(const void* guard);
+  void (*static_ended)(const void* guard);
   /// The flight code on this thread's stack, innermost first: number of frames written.
   int (*call_stack)(void** frames, int most);
 };

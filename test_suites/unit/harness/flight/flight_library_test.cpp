@@ -326,5 +326,32 @@ TEST(ElfImageTest, FunctionsAreFoundByAddress) {
   EXPECT_EQ(image.function_at(entry - base), "orrery_flight_entry");
 }
 
+// Without a word about it the second process would wait for ever on the static's guard.
+TEST(HalfInitialisedStaticTest, IsNamedToWhoeverWantsItNext) {
+  if (!heap_simulation_available()) GTEST_SKIP() << "a sanitizer owns the program's hooks";
+  for (const Isolation isolation : {Isolation::kCopy, Isolation::kShared}) {
+    FlightProcessOptions o{
+        .spacecraft = "dsc", .library = "flight_test_half_run", .isolation = isolation};
+    FlightProcess first(o);
+    o.spacecraft = "osc";
+    FlightProcess second(o);
+    first.create(SimTime{}, 0);
+    second.create(SimTime{}, 0);
+    EXPECT_EQ(first.input(SimTime{}, 0, first.ports()[0], order("c")), CallOutcome::kCrashed);
+    EXPECT_EQ(second.input(SimTime{}, 0, second.ports()[0], order("n")), CallOutcome::kDone);
+    const CallOutcome outcome = second.input(SimTime{}, 0, second.ports()[0], order("u"));
+    if (isolation == Isolation::kCopy) {
+      EXPECT_EQ(outcome, CallOutcome::kDone);
+      continue;
+    }
+    ASSERT_EQ(outcome, CallOutcome::kCrashed);
+    EXPECT_EQ(second.crash().kind, CrashKind::kForbiddenCall);
+    EXPECT_THAT(
+        second.crash().message,
+        testing::AllOf(testing::HasSubstr("\"flight_test_half_run\" cannot be used"),
+                       testing::HasSubstr("dsc/gnc crashed"), testing::HasSubstr("the_table")));
+  }
+}
+
 }  // namespace
 }  // namespace orrery
