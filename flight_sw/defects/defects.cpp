@@ -1,6 +1,8 @@
 // One defect per library: DEFECT says which. A command of n bytes is answered with telemetry; the
 // defect waits for a command whose first byte is 'x'.
 #include <cstdint>
+#include <cstdlib>
+#include <cstring>
 #include <pthread.h>
 #include <stdexcept>
 
@@ -12,6 +14,10 @@
 #define UNGUARDED_THREAD 4
 #define EXCEPTION 5
 #define GLOBAL_STATE 6
+#define LEAK 7
+#define DOUBLE_FREE 8
+#define OVERRUN 9
+#define UNINITIALISED_READ 10
 
 #define NOINLINE __attribute__((noinline))  // to be seen on the stack
 
@@ -108,6 +114,57 @@ std::uint32_t Defective::misbehave(Bytes message) {
 std::uint32_t commands_heard = 0;  // of both spacecraft, where they share the library
 std::uint32_t Defective::misbehave(Bytes) {
   return ++commands_heard;
+}
+
+#elif DEFECT == LEAK
+char* volatile last_command = nullptr;  // and the one before is forgotten
+NOINLINE void keep(const void* text, std::uint32_t size) {
+  last_command = static_cast<char*>(std::malloc(size));
+  std::memcpy(last_command, text, size);
+}
+std::uint32_t Defective::misbehave(Bytes message) {
+  keep(message.data, message.size);
+  return message.size;
+}
+
+#elif DEFECT == DOUBLE_FREE
+void* volatile buffer = nullptr;
+NOINLINE void discard() {
+  std::free(buffer);
+  asm volatile("");  // no tail call, which would leave this function off the stack
+}
+std::uint32_t Defective::misbehave(Bytes message) {
+  buffer = std::malloc(message.size);
+  discard();
+  discard();  // on the way out, as on the way in
+  return message.size;
+}
+
+#elif DEFECT == OVERRUN
+NOINLINE std::uint32_t copy_name(const char* text, std::uint32_t size) {
+  char* volatile name = static_cast<char*>(std::malloc(8));  // long enough for every name so far
+  for (std::uint32_t i = 0; i < size; ++i) name[i] = text[i];
+  const std::uint32_t first = static_cast<unsigned char>(name[0]);
+  std::free(name);
+  return first;
+}
+std::uint32_t Defective::misbehave(Bytes message) {
+  return copy_name(static_cast<const char*>(message.data), message.size);
+}
+
+#elif DEFECT == UNINITIALISED_READ
+struct Report {
+  std::uint32_t bytes, mode;
+};
+NOINLINE std::uint32_t report(std::uint32_t bytes) {
+  volatile Report* made = static_cast<volatile Report*>(std::malloc(sizeof(Report)));
+  made->bytes = bytes;
+  const std::uint32_t mode = made->mode;  // of which nobody thought
+  std::free(const_cast<Report*>(made));
+  return mode;
+}
+std::uint32_t Defective::misbehave(Bytes message) {
+  return report(message.size);
 }
 
 #endif
