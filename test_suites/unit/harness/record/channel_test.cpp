@@ -58,5 +58,64 @@ TEST(ChannelTest, ExtremesOfAnEmptyChannelAreRefusedByName) {
   EXPECT_THROW(static_cast<void>(channel.last()), std::logic_error);
 }
 
+TEST(ChannelTest, FrameIsTheWordBeforeTheUnit) {
+  EXPECT_EQ(frame_of("dsc/navigation/error_RTN_m"), "RTN");
+  EXPECT_EQ(frame_of("dsc/bus/omega_BI_B_radps"), "B");
+  EXPECT_EQ(frame_of("dsc/magnetometer/field_S"), "S");
+  EXPECT_EQ(frame_of("dsc/sun_sensor/angle_rad"), "");
+  EXPECT_EQ(frame_of("RTN"), "");
+}
+
+TEST(ChannelTest, AVectorHasItsNormAndItsAxes) {
+  Channel channel("dsc/navigation/error_RTN_m", ChannelKind::kVector, from_ns(5));
+  channel.add(from_ns(10), Channel::Components{2, -3, 6});
+  channel.extend_to(from_ns(20));
+  EXPECT_EQ(channel.frame(), "RTN");
+  EXPECT_EQ(channel.unit(), "m");
+  EXPECT_EQ(channel.last().value, 7);
+  const Channel along_t = channel.along(1);
+  EXPECT_EQ(along_t.name(), "dsc/navigation/error_RTN_m along T");
+  EXPECT_EQ(along_t.unit(), "m");
+  EXPECT_EQ(along_t.last().value, -3);
+  EXPECT_EQ(along_t.start(), from_ns(5));
+  EXPECT_EQ(along_t.end(), from_ns(20));
+  EXPECT_EQ(Channel("a/r_ECI_m", ChannelKind::kVector).axis_name(2), "z");
+}
+
+TEST(ChannelTest, AStateIsRecordedWhenItChanges) {
+  Channel mode("dsc/mode", ChannelKind::kState);
+  mode.add(from_ns(0), "IDLE");
+  mode.add(from_ns(10), "IDLE");
+  mode.add(from_ns(20), "SAFE");
+  mode.add(from_ns(30), "IDLE");
+  ASSERT_EQ(mode.samples().size(), 3u);
+  EXPECT_EQ(mode.text(mode.samples()[1]), "SAFE");
+  EXPECT_EQ(mode.state_at(from_ns(19)), "IDLE");
+  EXPECT_EQ(mode.state_at(from_ns(20)), "SAFE");
+  EXPECT_EQ(mode.state_at(from_ns(-1)), "");
+  EXPECT_EQ(mode.only("IDLE").samples().size(), 2u);
+  EXPECT_EQ(mode.only("IDLE").kind(), ChannelKind::kEvent);
+  EXPECT_EQ(testing::PrintToString(mode), "\"dsc/mode\" (3 states, the last IDLE)");
+}
+
+TEST(ChannelTest, EveryEventIsRecorded) {
+  Channel burns("dsc/thruster/burn", ChannelKind::kEvent);
+  burns.add(from_ns(30), "done");
+  burns.add(from_ns(20), "done");
+  EXPECT_EQ(burns.samples().size(), 2u);
+  EXPECT_EQ(burns.first_time(), from_ns(20));
+  EXPECT_EQ(burns.only("lost").first_time(), std::nullopt);
+  EXPECT_EQ(testing::PrintToString(burns.only("lost")), "\"dsc/thruster/burn lost\" (no events)");
+}
+
+TEST(ChannelTest, AnotherKindIsRefusedByName) {
+  Channel mode("dsc/mode", ChannelKind::kState);
+  EXPECT_THAT([&] { mode.add(from_ns(0), 1.0); },
+              testing::ThrowsMessage<std::logic_error>(testing::HasSubstr(
+                  "\"dsc/mode\" records states; it was given or asked for a number")));
+  EXPECT_THROW(mode.along(0), std::logic_error);
+  EXPECT_THROW(Channel("a/x_m").only("SAFE"), std::logic_error);
+}
+
 }  // namespace
 }  // namespace orrery
