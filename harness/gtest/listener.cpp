@@ -1,5 +1,6 @@
 #include <orrery/harness/gtest/determinism.hpp>
 #include <orrery/harness/gtest/listener.hpp>
+#include <orrery/harness/gtest/requirements.hpp>
 #include <orrery/harness/gtest/run_context.hpp>
 #include <orrery/harness/heap/interposition.hpp>
 
@@ -27,11 +28,13 @@ class Listener : public testing::EmptyTestEventListener {
     explained_ = false;
     set_current_test(std::string(test.test_suite_name()) + "." + test.name());
     internal::begin_determinism_check();
+    internal::begin_requirements();
   }
   // Before GoogleTest's own printer, so that a failure that is added here is the test's.
   void OnTestEnd(const testing::TestInfo& test) override {
     internal::end_determinism_check(test);
     for (const EndOfTest& end : ends_of_tests()) end(test);
+    internal::end_requirements(test);
     set_current_test({});
   }
 
