@@ -15,6 +15,7 @@
 
 namespace orrery {
 
+class CallRecording;
 class RandomStreams;
 class FlightAdapter;
 class Process;
@@ -75,8 +76,9 @@ struct FlightProcessOptions {
   /// overtaking one of the same port.
   std::map<std::string, Duration> scheduling_jitter = {};
   HostServices services = HostServices::kVirtual;
-  RandomStreams* random = nullptr;  // of the run; null: a set of the process's own
-  bool clock_keeps_power = false;   // false: after a power cycle the clock starts at its zero
+  RandomStreams* random = nullptr;            // of the run; null: a set of the process's own
+  std::shared_ptr<CallRecording> calls = {};  // gets every call of every life; null: none is kept
+  bool clock_keeps_power = false;  // false: after a power cycle the clock starts at its zero
 };
 
 /// "dsc/gnc": how messages and records name a process.

@@ -1,3 +1,4 @@
+#include <orrery/harness/flight/call_recording.hpp>
 #include <orrery/harness/flight/flight_process_impl.hpp>
 #include <orrery/harness/flight/library_closure.hpp>
 #include <orrery/harness/flight/port_table.hpp>
@@ -227,9 +228,34 @@ CallOutcome FlightProcess::Impl::call(CallArguments arguments, SimTime truth, By
       contained_, [](void* self) { static_cast<Impl*>(self)->run_library_call(); }, this, capture_);
   stopwatch.stop();
   end_call(truth);
+  if (options.calls != nullptr) record_call(data, returned);
   if (returned) return judge(arguments_, truth);
   die_of_last_call(truth);
   return CallOutcome::kCrashed;
+}
+
+void FlightProcess::Impl::record_call(Bytes data, bool returned) {
+  CallRecording& calls_made = *options.calls;
+  const CallArguments& a = arguments_;
+  if (a.call == Call::kCreate) {
+    calls_made.boot({a.onboard_ns, a.boot->boot_count, a.boot->reset_cause, options.spacecraft,
+                     options.process, options.config});
+  } else if (a.call == Call::kInput) {
+    calls_made.input(a.onboard_ns, a.port->id, data);
+  } else if (a.call == Call::kTick) {
+    calls_made.tick(a.onboard_ns);
+  } else if (a.call == Call::kDestroy) {
+    calls_made.destroy();
+  }
+  for (const OutputRow& row : outputs) {
+    calls_made.output(ports[row.port].id, Bytes(output_bytes).subspan(row.begin, row.bytes));
+  }
+  if (tick_request) calls_made.tick_request(*tick_request);
+  if (returned) {
+    calls_made.status(a.status);
+  } else {
+    calls_made.crash();
+  }
 }
 
 void FlightProcess::Impl::die_of_last_call(SimTime truth) {

@@ -109,6 +109,7 @@ class FlightProcess::Impl {
   void find_work_counter();
   void fill_host_table();
   void begin_call();
+  void record_call(Bytes data, bool returned);
   void end_call(SimTime truth);
   void run_library_call();
   CallOutcome judge(const internal::CallArguments& arguments, SimTime truth);

@@ -2,6 +2,7 @@
 // flight code; the rest is simulator code under SimulatorScope. A crash may leave these functions
 // between any two lines.
 
+#include <orrery/harness/flight/call_recording.hpp>
 #include <orrery/harness/flight/flight_memory.hpp>
 #include <orrery/harness/flight/flight_process_impl.hpp>
 
@@ -84,6 +85,10 @@ std::int32_t FlightProcess::Impl::load_slot(std::uint32_t slot, void* buffer,
                                             std::uint32_t capacity) {
   if (!calling()) return ORRERY_REJECTED;
   const ByteBuffer* content = memory->slot(slot);
+  if (options.calls != nullptr) {
+    const SimulatorScope scope;
+    options.calls->slot_loaded(slot, content);
+  }
   if (content == nullptr) return ORRERY_NOT_FOUND;
   if (content->size() > capacity) return ORRERY_TOO_SMALL;
   copy_between(buffer, content->data(), content->size());
