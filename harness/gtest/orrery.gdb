@@ -28,6 +28,14 @@ orrery-break SPACECRAFT/PROCESS LOCATION: stops in the flight code of that proce
 copy of its library it runs: orrery-break deputy/gnc FormationKeeping::tick
 end
 
+define orrery-event
+  watch sim_event if sim_event == $arg0
+end
+document orrery-event
+orrery-event N: stops when event N of a run begins (orrery-state and failures print numbers of events).
+A watchpoint of the processor on a thread-local variable: the program must have been started.
+end
+
 define orrery-symbols
   sharedlibrary /$arg0\.
 end
