@@ -35,7 +35,9 @@ struct Flags {
   bool verify_determinism = false;  // --orrery_verify_determinism: run each test twice, compare
   bool shrink = false;              // --orrery_shrink: reduce a failing test's faults, print them
   std::uint64_t shuffle_ties = 0;  // --orrery_shuffle_ties=N: ties in another order, seeded; 0: not
-  bool progress = false;           // --orrery_progress: progress and a result table
+  /// --orrery_progress: a line per twentieth of a run, and a result table. Empty: one line that
+  /// changes, on a terminal alone; false: never.
+  std::optional<bool> progress = {};
 };
 
 /// Reads and removes the --orrery_* flags. Call it before testing::InitGoogleTest, which evaluates

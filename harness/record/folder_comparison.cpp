@@ -26,7 +26,9 @@ std::set<std::string> files_below(const fs::path& folder) {
   }
   std::set<std::string> files;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (entry.is_regular_file() && entry.path().filename() != "manifest.json") {
+    const fs::path name = entry.path().filename();
+    const bool ignored = name == "manifest.json" || name == "index.html" || name == ".index.lock";
+    if (entry.is_regular_file() && !ignored) {
       files.insert(entry.path().lexically_relative(folder).generic_string());
     }
   }

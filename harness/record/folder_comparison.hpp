@@ -21,7 +21,8 @@ struct FileDifference {
 /// One entry for each file that differs: first those over time, the earliest first, then the others
 /// by name.
 ///
-/// Ignored  what equal runs may write otherwise: manifest.json, and in summary.json the host times
+/// Ignored  what equal runs may write otherwise: manifest.json, index.html, and in summary.json the
+/// host times
 ///          wall_s, flight_wall_s and x_real_time; in report.html speed and command line.
 /// Tables   (.csv) are compared field by field; a first column that ends in GPS_ns is the time. All
 ///          else is compared line by line, or byte by byte where it is not text.

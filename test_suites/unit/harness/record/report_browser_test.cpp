@@ -1,0 +1,153 @@
+// Opens report.html in headless Chromium, and reads the curves back from the pixels that it drew.
+#include <orrery/harness/record/report_page.hpp>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+#include "scratch_folder.hpp"
+
+namespace orrery {
+namespace {
+
+constexpr Duration kLength = 50h;
+
+std::string output_of(const std::string& command, int& status) {
+  std::string text;
+  FILE* pipe = popen(command.c_str(), "r");
+  if (pipe == nullptr) return text;
+  char part[4096];
+  for (std::size_t n; (n = fread(part, 1, sizeof part, pipe)) > 0;) text.append(part, n);
+  status = pclose(pipe);
+  return text;
+}
+
+bool has_chromium() {
+  int status = 0;
+  return !output_of("command -v chromium 2>/dev/null", status).empty();
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
+    text.replace(at, from.size(), to);
+  return text;
+}
+
+/// What the page says of its own drawing; empty, with a failure, if it says nothing.
+nlohmann::json measured(const std::filesystem::path& page, const std::filesystem::path& profile) {
+  const std::string command =
+      "timeout 100 chromium --headless --no-sandbox --disable-gpu --disable-quic --no-first-run "
+      "--disable-background-networking --disable-component-update --disable-sync "
+      "--user-data-dir='" +
+      profile.string() +
+      "' --window-size=1280,900 "
+      "--virtual-time-budget=3000 --dump-dom 'file://" +
+      page.string() + "#selftest' 2>/dev/null";
+  int status = 0;
+  const std::string dom = output_of(command, status);
+  const std::string begin = "<pre id=\"selftest\">";
+  const std::size_t at = dom.find(begin);
+  EXPECT_NE(at, std::string::npos) << "chromium ended with status " << status << " and printed\n"
+                                   << dom.substr(0, 2000);
+  if (at == std::string::npos) return {};
+  const std::size_t end = dom.find("</pre>", at);
+  const std::string text = dom.substr(at + begin.size(), end - at - begin.size());
+  return nlohmann::json::parse(
+      replaced(replaced(replaced(text, "&lt;", "<"), "&gt;", ">"), "&amp;", "&"));
+}
+
+// The curves, by their formulas. The second one jumps between 0 and 7 from sample to sample around
+// the middle of the run: a page that thins by leaving samples out, or by means, shows something
+// else.
+double slow(double t_s) {
+  return 40 + 30 * std::sin(2 * M_PI * t_s / 40'000);
+}
+double jumping(double t_s, int sample) {
+  const bool middle = std::abs(t_s - to_seconds(kLength) / 2) < 1800;
+  return middle ? 7.0 * (sample % 2) : 2.0;
+}
+
+Report full_report() {
+  Report report{.title = "ReportBrowserTest", .result = "failed", .length = kLength};
+  SeriesEnvelope a, b, sigma;
+  for (int i = 0; i <= 180'000; ++i) {
+    a.add(i * 1s, slow(i));
+    b.add(i * 1s, jumping(i, i));
+    sigma.add(i * 1s, 3);
+  }
+  report.header = {{"seed", "1"}};
+  report.host = {{"replay", "./test --gtest_filter='A.B' --orrery_seed=1 & more <of it>"}};
+  report.table = {{"", "delta-v"}, {{"deputy", "0.3"}}};
+  report.time_charts = {{.title = "Slow", .unit = "m", .series = {{"slow", a}}},
+                        {.title = "Jumping", .unit = "bytes", .series = {{"a", b}, {"b", a}}}};
+  report.time_charts[1].sigma = sigma;
+  report.time_charts[1].limit = 60;
+  report.origin = "chief";
+  report.paths = {{"deputy", {}}};
+  for (int i = 0; i < 100; ++i) {
+    report.paths[0].points.push_back({i * 30min, std::cos(0.1 * i), 2 * std::sin(0.1 * i), 1});
+  }
+  report.links = {{"chief-deputy",
+                   {{.kind = "delivered", .messages = {{1h, 100ms}, {3h, 250ms}}, .count = 2},
+                    {.kind = "lost", .messages = {{2h, {}}}, .count = 1},
+                    {.kind = "reordered", .messages = {{2h, 3h}}, .count = 1}}}};
+  report.lanes = {{"deputy process", {{0s, "on"}, {20h, "off"}}}};
+  report.faults = {{"deputy/gnss", "outage", 10h, 12h}, {"chief-deputy", "loss", 30h, {}}};
+  report.arenas = {{"Heap of deputy", "16 bytes per cell", {"##5.", "1."}}};
+  report.events = {{5s, "deputy", "impulse of 1 m/s"}};
+  return report;
+}
+
+// The least and the most that a curve has between two times, with a column more on each side.
+std::pair<double, double> range_of(const std::string& name, double from_s, double until_s) {
+  double least = 1e9, most = -1e9;
+  const double more = until_s - from_s;
+  for (int i = static_cast<int>(from_s - more); i <= static_cast<int>(until_s + more); ++i) {
+    const double value = name == "a" ? jumping(i, i) : slow(i);
+    least = std::min(least, value);
+    most = std::max(most, value);
+  }
+  return {least, most};
+}
+
+TEST(ReportBrowserTest, EveryPlotShowsItsData) {
+  if (!has_chromium()) {
+    GTEST_SKIP() << "no chromium in PATH: apt-get install chromium, or ci/setup";
+  }
+  const ScratchFolder scratch;
+  std::ofstream(scratch / "report.html") << to_html(full_report());
+  const nlohmann::json page = measured(scratch / "report.html", scratch / "profile");
+  ASSERT_TRUE(page.is_object());
+  EXPECT_EQ(page["problems"], nlohmann::json::array()) << "script errors";
+  std::vector<std::string> titles;
+  for (const auto& chart : page["charts"]) {
+    titles.push_back(chart["title"]);
+    EXPECT_GT(chart["painted"].get<int>(), 500) << chart["title"];
+  }
+  EXPECT_THAT(titles,
+              testing::UnorderedElementsAre(
+                  "Along track and radial", "Cross track and radial", "Along track and cross track",
+                  "Modes", "Slow [m]", "Jumping [bytes]", "Link chief-deputy", "Heap of deputy"));
+  int points = 0;
+  for (const auto& chart : page["charts"]) {
+    for (const auto& series : chart["series"]) {
+      // Half of the line's 1.4 px, half a pixel of rounding, and the blurred edge.
+      const double tolerance = 2 * series["pixel"].get<double>();
+      for (const auto& point : series["points"]) {
+        const auto [least, most] = range_of(series["name"], point["from"], point["until"]);
+        EXPECT_NEAR(point["least"].get<double>(), least, tolerance) << series["name"] << point;
+        EXPECT_NEAR(point["most"].get<double>(), most, tolerance) << series["name"] << point;
+        ++points;
+      }
+    }
+  }
+  EXPECT_EQ(points, 3 * 7) << "seven columns of each curve";
+}
+
+}  // namespace
+}  // namespace orrery
