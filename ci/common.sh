@@ -7,6 +7,7 @@ program=ci/$(basename "$0")
 jobs=$(nproc)
 logs=$root/build/logs
 declare -a finished=()
+on_failure=   # a command that a failing shown_step runs first
 cd "$root" || exit 1
 mkdir -p "$logs"
 
@@ -67,7 +68,7 @@ shown_step() {
   log=$logs/$(printf '%s' "$title" | tr -cs 'a-zA-Z0-9+\n' '_').log
   printf -- '-- %s\n' "$title"
   start=$SECONDS
-  "$@" </dev/null 2>&1 | tee "$log" || fail_step "$title" "$log" "$*" quiet
+  "$@" </dev/null 2>&1 | tee "$log" || { ${on_failure-}; fail_step "$title" "$log" "$*" quiet; }
   finished+=("$(as_minutes $((SECONDS - start)))  $title")
 }
 
