@@ -1,0 +1,75 @@
+// What recording costs: 20 h of two spacecraft that fly formation_keeping, truth at 1 Hz and all
+// files, against the same run with --orrery_record=off in effect. The two alternate, so that a
+// machine that others use slows both.
+#include <orrery/orrery.hpp>
+
+#include <benchmark/benchmark.h>
+
+#include <cstdlib>
+#include <ctime>
+#include <filesystem>
+#include <string>
+
+namespace orrery {
+namespace {
+
+double cpu_s() {
+  timespec t{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+// From construction to destruction: the report and the index are part of it.
+double fly(bool record, Duration span, Duration receiver_period) {
+  const double begin_s = cpu_s();
+  FormationOptions options;
+  options.flight.library = "formation_keeping";
+  options.world.record = record;
+  {
+    options = missions::first_flight(options);
+    options.gnss.period = receiver_period;
+    if (receiver_period == 1s) {
+      using novatel::LogTrigger;
+      options.gnss.logs = {{novatel::kRangeId, LogTrigger::kOnTime, receiver_period},
+                           {novatel::kBestXyzId, LogTrigger::kOnTime, receiver_period}};
+    }
+    FormationWorld world(options);
+    world.run_for(span);
+  }
+  return cpu_s() - begin_s;
+}
+
+std::filesystem::path scratch_folder() {
+  std::string pattern = (std::filesystem::temp_directory_path() / "orrery_bench_XXXXXX").string();
+  return mkdtemp(pattern.data());
+}
+
+void BM_RecordingAtOneHertz(benchmark::State& state) {
+  const std::filesystem::path out = scratch_folder();
+  setenv("ORRERY_OUT", out.c_str(), 1);  // before flags() is first asked
+  double off_s = 0, on_s = 0;
+  for (auto _ : state) {
+    off_s += fly(false, state.range(0) * 1h, state.range(1) * 1s);
+    on_s += fly(true, state.range(0) * 1h, state.range(1) * 1s);
+    std::filesystem::remove_all(out);
+  }
+  const double runs = static_cast<double>(state.iterations());
+  state.counters["off_s"] = off_s / runs;
+  state.counters["on_s"] = on_s / runs;
+  state.counters["cost_percent"] = 100 * (on_s / off_s - 1);
+}
+#ifdef __SANITIZE_ADDRESS__
+constexpr int kHours = 1;
+#else
+constexpr int kHours = 20;
+#endif
+// Receivers that say where they are every 10 s, as the reference mission has them; and receivers
+// that give all measurements at 1 Hz.
+BENCHMARK(BM_RecordingAtOneHertz)
+    ->ArgNames({"hours", "receiver_period_s"})
+    ->Args({kHours, 10})
+    ->Args({kHours, 1})
+    ->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace orrery
