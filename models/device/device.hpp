@@ -63,6 +63,14 @@ class DeviceContext {
 
   /// Adds a sample to the channel "<spacecraft>/<device>/<channel>".
   virtual void record(std::string_view channel, double value) = 0;
+  /// Components in the frame that the name gives: record("error_RTN_m", error_RTN).
+  virtual void record(std::string_view channel, const Vec3& value) = 0;
+  /// The discrete state, such as a mode, that is in force from now on.
+  virtual void record_state(std::string_view channel, std::string_view state) = 0;
+  /// Something happened. A channel of events that may stay without any is declared in start(), so
+  /// that a test can say that nothing happened.
+  virtual void record_event(std::string_view channel, std::string_view what) = 0;
+  virtual void declare_event(std::string_view channel) = 0;
   /// A message in the run's log. The levels are those of orrery_flight.h.
   virtual void log(int level, std::string_view line) = 0;
   static constexpr int kDebug = 0, kInfo = 1, kWarning = 2, kError = 3;

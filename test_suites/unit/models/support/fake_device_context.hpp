@@ -39,6 +39,10 @@ class FakeDeviceContext final : public DeviceContext {
     std::string channel;
     double value;
   };
+  struct Text {  // a state or an event
+    SimTime t;
+    std::string channel, text;
+  };
   struct LogLine {
     int level;
     std::string text;
@@ -61,6 +65,7 @@ class FakeDeviceContext final : public DeviceContext {
   std::vector<Impulse> impulses;
   std::vector<ThrustEdge> thrusts;
   std::vector<Sample> samples;
+  std::vector<Text> texts;
   std::vector<LogLine> log_lines;
 
   /// Runs timers up to and including `t`, in order of time, then of setting.
@@ -118,6 +123,16 @@ class FakeDeviceContext final : public DeviceContext {
   }
   void apply_impulse(const Vec3& dv_ECI) override { impulses.push_back({now_, dv_ECI}); }
   void set_thrust(const Thrust& thrust) override { thrusts.push_back({now_, thrust}); }
+  void record(std::string_view channel, const Vec3& value) override {
+    samples.push_back({now_, std::string(channel), norm(value)});
+  }
+  void record_state(std::string_view channel, std::string_view state) override {
+    texts.push_back({now_, std::string(channel), std::string(state)});
+  }
+  void record_event(std::string_view channel, std::string_view what) override {
+    texts.push_back({now_, std::string(channel), std::string(what)});
+  }
+  void declare_event(std::string_view) override {}
   void record(std::string_view channel, double value) override {
     samples.push_back({now_, std::string(channel), value});
   }

@@ -52,6 +52,10 @@ class OrbitingDeviceContext final : public DeviceContext {
   void apply_impulse(const Vec3&) override {}
   void set_thrust(const Thrust&) override {}
   void record(std::string_view, double) override {}
+  void record(std::string_view, const Vec3&) override {}
+  void record_state(std::string_view, std::string_view) override {}
+  void record_event(std::string_view, std::string_view) override {}
+  void declare_event(std::string_view) override {}
   void log(int, std::string_view) override {}
   double fault(std::string_view, double nominal) const override { return nominal; }
   bool may_be_faulty() const override { return false; }
