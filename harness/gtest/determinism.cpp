@@ -1,8 +1,10 @@
 #include <orrery/harness/gtest/child_process.hpp>
 #include <orrery/harness/gtest/determinism.hpp>
 #include <orrery/harness/gtest/flags.hpp>
+#include <orrery/harness/gtest/run_context.hpp>
 
 #include <algorithm>
+#include <charconv>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -123,19 +125,42 @@ Repeat repeat(const testing::TestInfo& test, const RunVariation& variation, bool
   return result;
 }
 
+// "tick of chief at 60.5 s, chain 0123": when that was. Empty: the line says no time in seconds.
+std::optional<Duration> time_of_event(const std::string& line) {
+  const std::size_t end = line.rfind(" s, chain "), begin = line.rfind(" at ", end);
+  if (end == std::string::npos || begin == std::string::npos) return {};
+  double seconds = 0;
+  const char* const last = line.data() + end;
+  const auto parsed = std::from_chars(line.data() + begin + 4, last, seconds);
+  if (parsed.ec != std::errc() || parsed.ptr != last) return {};
+  return from_seconds(seconds);
+}
+
+// The command that verifies again, and one that stops where the runs part, if that is known.
+std::string commands(std::optional<Duration> parting) {
+  std::string text = "\n  replay: " + replay_command();
+  if (flags().verify_determinism) text += " --orrery_verify_determinism";
+  if (parting) text += "\n  debug: " + debug_command(parting);
+  return text;
+}
+
 // Where the runs part, to the event: both once more, with a log of the stretch in question.
 std::string first_event(const testing::TestInfo& test, const TraceDifference& difference,
                         const RunVariation& one, const RunVariation& other) {
   const Repeat a = repeat(test, with_log(one, difference), false),
                b = repeat(test, with_log(other, difference), false);
-  if (a.traces.size() <= difference.run || b.traces.size() <= difference.run) return "";
-  const std::string text =
-      describe_log_difference(a.traces[difference.run], b.traces[difference.run]);
-  if (!text.empty()) return "\nThe first event that differs:\n" + text;
+  if (a.traces.size() <= difference.run || b.traces.size() <= difference.run) return commands({});
+  const RunTrace &x = a.traces[difference.run], &y = b.traces[difference.run];
+  if (const std::string text = describe_log_difference(x, y); !text.empty()) {
+    const auto parts = std::mismatch(x.log.begin(), x.log.end(), y.log.begin(), y.log.end()).first;
+    const auto t = parts == x.log.end() ? std::nullopt : time_of_event(*parts);
+    return "\nThe first event that differs:\n" + text + commands(t);
+  }
   return "\nRun twice more, the events " + std::to_string(difference.from_event + 1) + " to " +
          std::to_string(difference.until_event) +
          " were equal: what differs changes from run to run, as the wall clock does, or lies in "
-         "random draws alone.";
+         "random draws alone." +
+         commands({});
 }
 
 // The line of a child's output that holds the word, and those after it that are indented: the stack
@@ -229,7 +254,7 @@ void verify(const testing::TestInfo& test, const std::vector<RunTrace>& first) {
   } else if (!second.outcome.passed()) {
     ADD_FAILURE() << "the same seed gave another result: the test passed, and repeated "
                   << second.outcome.describe() << "; the end of its output:\n"
-                  << second.outcome.tail;
+                  << second.outcome.tail << commands({});
   }
 }
 

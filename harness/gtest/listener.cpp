@@ -32,6 +32,7 @@ class Listener : public testing::EmptyTestEventListener {
   }
   // Before GoogleTest's own printer, so that a failure that is added here is the test's.
   void OnTestEnd(const testing::TestInfo& test) override {
+    explained_ = true;  // what fails from here on brings its own commands
     internal::end_determinism_check(test);
     for (const EndOfTest& end : ends_of_tests()) end(test);
     internal::end_requirements(test);
@@ -41,10 +42,15 @@ class Listener : public testing::EmptyTestEventListener {
   void OnTestPartResult(const testing::TestPartResult& result) override {
     if (!result.failed() || explained_) return;
     const std::string runs = describe_live_runs();
-    if (runs.empty()) return;
+    if (runs.empty() && !world_was_noted()) return;  // none of ours
     explained_ = true;
-    std::printf("[ orrery   ] where this run stands:\n%s", runs.c_str());
+    if (runs.empty()) {
+      std::printf("[ orrery   ] no run is alive: its world could not be made, or has ended\n");
+    } else {
+      std::printf("[ orrery   ] where this run stands:\n%s", runs.c_str());
+    }
     std::printf("  replay: %s\n", replay_command().c_str());
+    std::printf("  debug: %s\n", debug_command(live_run_elapsed()).c_str());
     std::fflush(stdout);
   }
 

@@ -27,8 +27,14 @@ std::string describe(const RunSnapshot& s) {
   std::string text = "  seed " + std::to_string(s.seed) + ", simulated " + to_string(s.elapsed) +
                      " (" + to_string(s.now) + "), " + std::to_string(s.events) +
                      " events, fingerprint " + s.fingerprint + "\n";
-  if (!s.last_event.empty()) text += "  last event: " + s.last_event + "\n";
+  if (!s.last_events.empty()) text += "  last events:\n";
+  for (const std::string& event : s.last_events) text += "    " + event + "\n";
   return text + s.spacecraft;
+}
+
+bool& world_noted() {
+  thread_local bool noted = false;
+  return noted;
 }
 
 std::string& current_test() {
@@ -53,8 +59,21 @@ std::string describe_live_runs() {
   return text;
 }
 
+std::optional<Duration> live_run_elapsed() {
+  if (live_runs().empty()) return {};
+  return live_runs().back()->snapshot_().elapsed;
+}
+
+void note_world() {
+  world_noted() = true;
+}
+bool world_was_noted() {
+  return world_noted();
+}
+
 void set_current_test(const std::string& suite_and_name) {
   current_test() = suite_and_name;
+  world_noted() = false;
 }
 
 std::string replay_command() {
@@ -68,11 +87,12 @@ std::string replay_command() {
   return command;
 }
 
-std::string debug_command(Duration elapsed) {
+std::string debug_command(std::optional<Duration> elapsed) {
   const std::string replay = replay_command();
   if (replay.empty()) return {};
+  if (!elapsed) return "gdb -ex 'catch throw' -ex run --args " + replay;
   std::string seconds;
-  append_number(seconds, to_seconds(elapsed));
+  append_number(seconds, to_seconds(*elapsed));
   return "gdb -ex 'break sim_debug_break' -ex run --args " + replay +
          " --orrery_break_at=" + seconds;
 }

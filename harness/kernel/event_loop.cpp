@@ -1,6 +1,7 @@
 #include <orrery/harness/kernel/event_loop.hpp>
 #include <orrery/harness/kernel/sim_state.hpp>
 
+#include <algorithm>
 #include <stdexcept>
 #include <utility>
 
@@ -28,20 +29,20 @@ class EventLoop::Running {
     if (loop.fingerprint_.keeps_unordered()) loop.note_instant(event.key.t);
     sim_event = ++loop.executed_;
     loop.fingerprint_.event(event.key, event.kind->id);
-    loop.last_ = {event.key, event.kind, loop.fingerprint_.chain(event.key.destination)};
+    last() = {event.key, event.kind, loop.fingerprint_.chain(event.key.destination)};
   }
   Running(const Running&) = delete;
   Running& operator=(const Running&) = delete;
   ~Running() {
     if (loop_.in_fingerprint_) {
-      loop_.last_.chain = loop_.fingerprint_.chain(event_.key.destination);
+      last().chain = loop_.fingerprint_.chain(event_.key.destination);
       if (loop_.fingerprint_.keeps_unordered()) {
         loop_.fingerprint_.end_event(event_.key);
-        loop_.last_.chain = loop_.fingerprint_.this_event();
+        last().chain = loop_.fingerprint_.this_event();
       }
       if (loop_.keep_log_ && loop_.executed_ > loop_.log_from_ &&
           loop_.executed_ <= loop_.log_until_) {
-        loop_.log_.push_back(loop_.last_);
+        loop_.log_.push_back(last());
       }
       if (loop_.keep_checkpoints_ && loop_.executed_ % kCheckpointEvents == 0) {
         loop_.checkpoints_.push_back(loop_.fingerprint_.hash());
@@ -51,6 +52,8 @@ class EventLoop::Running {
   }
 
  private:
+  EventRecord& last() { return loop_.recent_[loop_.executed_ % kRecentEvents]; }
+
   EventLoop& loop_;
   const Event& event_;
 };
@@ -122,6 +125,15 @@ void EventLoop::advance_to(SimTime t) {
   move_to(t);
 }
 
+std::vector<EventRecord> EventLoop::recent_events() const {
+  std::vector<EventRecord> events;
+  const std::uint64_t count = std::min<std::uint64_t>(executed_, kRecentEvents);
+  for (std::uint64_t n = executed_ - count + 1; n <= executed_; ++n) {
+    events.push_back(recent_[n % kRecentEvents]);
+  }
+  return events;
+}
+
 void EventLoop::fingerprint_payload(Bytes payload) {
   if (current_kind_ == nullptr) {
     throw std::logic_error("EventLoop::fingerprint_payload: no event is running");
@@ -132,7 +144,9 @@ void EventLoop::fingerprint_payload(Bytes payload) {
 // Only where an instant begins are the events so far the same ones in another order of ties.
 void EventLoop::note_instant(SimTime t) {
   const std::uint64_t last = instant_checkpoints_.empty() ? 0 : instant_checkpoints_.back().events;
-  if (executed_ < last + kCheckpointEvents || last_.key.t == t) return;
+  if (executed_ < last + kCheckpointEvents || recent_[executed_ % kRecentEvents].key.t == t) {
+    return;
+  }
   instant_checkpoints_.push_back({executed_, fingerprint_.unordered_hash()});
 }
 

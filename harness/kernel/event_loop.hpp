@@ -6,6 +6,7 @@
 #include <orrery/harness/kernel/event_queue.hpp>
 #include <orrery/harness/kernel/fingerprint.hpp>
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -93,8 +94,9 @@ class EventLoop {
   /// Without the recorder's: the n-th event is the same one whatever is recorded.
   std::uint64_t events_executed() const { return executed_; }
   std::size_t events_pending() const { return queue_.size(); }
-  /// The event that ran last, or is running: for failure messages. Its kind is null if none has.
-  const EventRecord& last_event() const { return last_; }
+  /// The events that ran last, the running one included, oldest first: for failure messages.
+  static constexpr std::size_t kRecentEvents = 8;
+  std::vector<EventRecord> recent_events() const;
   /// Kind of the running event, for crash reports; null between events.
   const EventKind* current_kind() const { return current_kind_; }
 
@@ -115,7 +117,7 @@ class EventLoop {
   Fingerprint fingerprint_;
   std::vector<Owner> owners_;
   std::vector<EventRecord> log_;
-  EventRecord last_;
+  std::array<EventRecord, kRecentEvents> recent_;  // event n at n % kRecentEvents
   SimTime now_;
   const EventKind* current_kind_ = nullptr;
   OwnerId current_owner_ = 0;
