@@ -207,7 +207,7 @@ TEST(ReportPageTest, FiftyHoursStayBelowThreeMegabytes) {
   }
   for (int i = 0; i < 5000; ++i)
     report.events.push_back({i * 36s, "deputy", "an event of the run"});
-  EXPECT_LT(to_html(report).size(), 3'000'000u);  // observed: see the commit
+  EXPECT_LT(to_html(report).size(), 3'000'000u);
 }
 
 }  // namespace
