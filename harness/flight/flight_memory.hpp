@@ -1,6 +1,8 @@
 /// Memory of flight code, looked at on its behalf.
 #pragma once
 
+#include <orrery/harness/kernel/simulator_only.hpp>
+
 #include <cstddef>
 #include <cstring>
 

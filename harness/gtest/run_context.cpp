@@ -1,7 +1,6 @@
 #include <orrery/harness/gtest/flags.hpp>
 #include <orrery/harness/gtest/run_context.hpp>
 #include <orrery/harness/heap/simulated_heap.hpp>
-#include <orrery/harness/record/number_format.hpp>
 
 #include <algorithm>
 #include <cstdio>
@@ -91,8 +90,9 @@ std::string debug_command(std::optional<Duration> elapsed) {
   const std::string replay = replay_command();
   if (replay.empty()) return {};
   if (!elapsed) return "gdb -ex 'catch throw' -ex run --args " + replay;
-  std::string seconds;
-  append_number(seconds, to_seconds(*elapsed));
+  std::string seconds = std::to_string(*elapsed / 1s);
+  if (const auto rest_ns = (*elapsed % 1s).count(); rest_ns != 0)
+    seconds += "." + std::to_string(1'000'000'000 + rest_ns).substr(1);
   return "gdb -ex 'break sim_debug_break' -ex run --args " + replay +
          " --orrery_break_at=" + seconds;
 }

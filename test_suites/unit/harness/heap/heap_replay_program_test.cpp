@@ -8,6 +8,7 @@
 #include <fstream>
 #include <string>
 #include <sys/wait.h>
+#include <unistd.h>
 
 namespace orrery {
 namespace {
@@ -52,7 +53,7 @@ class HeapReplayProgramTest : public testing::Test {
     std::remove(path_.c_str());
     std::remove((path_ + ".csv").c_str());
   }
-  const std::string path_ = testing::TempDir() + "orrery_heap_replay_test.trace";
+  const std::string path_ = testing::TempDir() + "orrery_heap_replay_" + std::to_string(getpid());
 };
 
 TEST_F(HeapReplayProgramTest, PrintsTheFiguresOfEachPolicy) {
