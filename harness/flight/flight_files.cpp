@@ -26,8 +26,8 @@ FlightFiles::FlightFiles(const std::map<std::string, std::string>& files,
   for (const auto& [given, content] : files) {
     const bool is_folder = !given.empty() && given.back() == '/';
     const std::string path = normal("/", given);
-    const auto refuse = [&](const std::string& why) {
-      throw std::invalid_argument("FlightOptions::files: \"" + given + "\" " + why);
+    const auto refuse = [&name = given](const std::string& why) {
+      throw std::invalid_argument("FlightOptions::files: \"" + name + "\" " + why);
     };
     if (given.empty() || (path == "/" && !is_folder)) refuse("names no file");
     if (is_folder && !content.empty()) refuse("is a folder, so it has no content");

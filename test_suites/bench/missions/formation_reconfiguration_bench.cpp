@@ -35,12 +35,29 @@ void command_reconfiguration(FormationWorld& world) {
   world.ground().command("deputy", at(10min), command);
 }
 
+// One of each part, none of which begins before the mission's end.
+void arm_later_faults(FormationWorld& world) {
+  const When later = from(2 * kMission);
+  world.crosslink("chief", "deputy").drop(later);
+  world.crosslink("chief", "deputy").delay(later && with_probability(0.5), 5s);
+  world.crosslink("chief", "deputy").corrupt(later, 3);
+  for (const char* name : {"chief", "deputy"}) {
+    world.gnss(name).freeze(later);
+    world.gnss(name).bias(later, {10, 0, 0});
+    world.thruster(name).lose(later);
+    world.flight(name).slow_down(later, 10);
+    world.heap(name).fail_allocation(later);
+    world.storage(name).tear(later);
+  }
+}
+
 /// @param library  empty: orbits and receivers alone
-void BM_FirstFlight(benchmark::State& state, const std::string& library) {
+void BM_FirstFlight(benchmark::State& state, const std::string& library, bool faults = false) {
   double simulated_s = 0, flight_s = 0, total_s = 0;
   for (auto _ : state) {
     FormationWorld world(flown(library));
     if (!library.empty()) command_reconfiguration(world);
+    if (faults) arm_later_faults(world);
     world.run_for(kMission);
     simulated_s += to_seconds(kMission);
     flight_s += world.flight_wall_s();
@@ -53,6 +70,9 @@ void BM_FirstFlight(benchmark::State& state, const std::string& library) {
   state.counters["peak_memory_MB"] = peak_memory_MB();
 }
 BENCHMARK_CAPTURE(BM_FirstFlight, formation_keeping, std::string("formation_keeping"))
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(BM_FirstFlight, with_fifteen_inactive_faults, std::string("formation_keeping"),
+                  true)
     ->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(BM_FirstFlight, without_flight_software, std::string())
     ->Unit(benchmark::kMillisecond);

@@ -12,7 +12,6 @@
 namespace orrery {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 const SimTime kStart = gps_midnight(2025, 3, 20);
 
 // An Earth that turns about its pole, its meridian of Greenwich along x at the start.
