@@ -94,11 +94,13 @@ void FirstFitHeap::release(void* payload) noexcept {
   std::byte* const at = static_cast<std::byte*>(payload);
   const std::uint64_t distance = area_.distance(payload);
   const Offset block = static_cast<Offset>(distance);
-  if (distance >= area_.top || block < area_.first) return TaggedHeap::release(payload);
+  if (distance >= area_.top || block < area_.first || (block & (area_.align - 1)) != 0) {
+    return TaggedHeap::release(payload);
+  }
   const std::uint32_t tagged = header(at);
   const std::uint32_t size = tagged - kLive;  // odd if it was not live
-  if (((size | block) & (area_.align - 1)) != 0 || size < kLeastBlock_bytes ||
-      size > area_.top - block || footer(at, size) != tagged || list_.full()) {
+  if ((size & (area_.align - 1)) != 0 || size < kLeastBlock_bytes || size > area_.top - block ||
+      footer(at, size) != tagged || list_.full()) {
     return TaggedHeap::release(payload);
   }
   if ((header(at + size) & word(at, -8) & kLive) == 0) return release_joined(at, block, size);
