@@ -72,7 +72,7 @@ bool is_host_time(std::string_view summary_line) {
 
 // The report's line on speed and command line.
 bool is_of_host(std::string_view report_line) {
-  return report_line.starts_with(",\"host\":");
+  return report_line.starts_with(",\"host\":") || report_line.starts_with(",\"host_table\":");
 }
 
 bool is_text(std::string_view content) {

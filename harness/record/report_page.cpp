@@ -233,9 +233,9 @@ void append_rows(std::string& out, const char* key,
   append_array(out, rows, [&](const auto& row) { append_texts(out, {row.first, row.second}); });
 }
 
-void append_table(std::string& out, const Report::Table& table) {
+void append_table(std::string& out, const char* key, const Report::Table& table) {
   if (table.rows.empty()) return;
-  append_key(out, "table");
+  append_key(out, key);
   out += '{';
   append_key(out, "columns");
   append_texts(out, table.columns);
@@ -268,7 +268,9 @@ std::string to_json(const Report& report) {
   append_rows(out, "header", report.header);
   append_rows(out, "host", report.host);
   out += '\n';
-  append_table(out, report.table);
+  append_table(out, "host_table", report.host_table);
+  out += '\n';
+  append_table(out, "table", report.table);
   append_list(out, "charts", report.time_charts, has_data, append_chart);
   append_member(out, "origin", report.origin);
   append_list(

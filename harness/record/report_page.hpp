@@ -85,6 +85,7 @@ struct Report {
   /// Shown after it; equal runs differ in these (orrery-compare passes them over).
   std::vector<std::pair<std::string, std::string>> host = {};
   Table table = {};
+  Table host_table = {};  // as `host`
   std::vector<TimeChart> time_charts = {};
   std::string origin = {};  // of the paths: "chief"
   std::vector<Path> paths = {};

@@ -576,6 +576,7 @@ function repaint(atOnce) {
 }
 const applyTheme = addHeader();
 if (report.table) addTable(page, report.table.columns, report.table.rows, "numbers");
+if (report.host_table) addTable(page, report.host_table.columns, report.host_table.rows, "numbers");
 if (report.paths.length) {
   element("h2", page, "Relative motion in the RTN frame of " + report.origin);
   const planes = element("div", page, undefined, "planes");
