@@ -3,7 +3,9 @@
 
 #include <orrery/harness/kernel/simulator_only.hpp>
 
+#include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace orrery {
@@ -28,5 +30,19 @@ struct ChildOutcome {
 /// Starts /proc/self/exe and waits for it. It dies with this process.
 /// @throws std::runtime_error  it cannot be started.
 ChildOutcome run_child(const ChildCommand& command);
+
+/// For what a child leaves; removed with all that is in it.
+class TemporaryFolder {
+ public:
+  /// @param purpose  part of its name: "shrink". @throws std::runtime_error  it cannot be made.
+  explicit TemporaryFolder(std::string_view purpose);
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  std::filesystem::path operator/(const char* name) const { return path_ / name; }
+
+ private:
+  std::filesystem::path path_;
+};
 
 }  // namespace orrery

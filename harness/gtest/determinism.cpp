@@ -7,7 +7,6 @@
 #include <charconv>
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <optional>
@@ -20,8 +19,6 @@
 // "<file>\n" and the members of RunVariation in order.
 namespace orrery {
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr const char* kChildVariable = "ORRERY_REPEATED_RUN";
 constexpr std::uint64_t kOtherHeapSeed = 0x5ca77e4;
@@ -54,27 +51,6 @@ std::string to_variable(const Child& child) {
   return out.str();
 }
 
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string pattern = (fs::temp_directory_path() / "orrery_repeat_XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr) {
-      throw std::runtime_error("no folder can be made in " + fs::temp_directory_path().string());
-    }
-    path_ = pattern;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  fs::path operator/(const char* name) const { return path_ / name; }
-
- private:
-  fs::path path_;
-};
-
 struct Repeat {
   ChildOutcome outcome;
   std::vector<RunTrace> traces;
@@ -102,7 +78,7 @@ RunVariation with_log(RunVariation variation, const TraceDifference& difference)
 
 // The same test as a child. `other`: under conditions of the program that must not matter.
 Repeat repeat(const testing::TestInfo& test, const RunVariation& variation, bool other) {
-  const TemporaryFolder folder;
+  const TemporaryFolder folder("repeat");
   const std::string traces = (folder / "traces").string();
   ChildCommand command;
   command.arguments = {"--gtest_filter=" + std::string(test.test_suite_name()) + "." + test.name(),
