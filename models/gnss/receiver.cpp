@@ -330,8 +330,9 @@ void GnssReceiver::solve(DeviceContext& io, const AntennaPlace& antenna) {
   RandomStream* const streams[] = {position_noise_, velocity_noise_};
   std::array<std::array<double, 3>, 2> z;
   normal_triples(streams, z);
-  const Vec3 noise_r = options_.sigma_position_m * Vec3{z[0][0], z[0][1], z[0][2]};
-  const Vec3 noise_v = options_.sigma_velocity_mps * Vec3{z[1][0], z[1][1], z[1][2]};
+  const double times = io.fault("noise", 1.0);
+  const Vec3 noise_r = times * options_.sigma_position_m * Vec3{z[0][0], z[0][1], z[0][2]};
+  const Vec3 noise_v = times * options_.sigma_velocity_mps * Vec3{z[1][0], z[1][1], z[1][2]};
   int usable = 0;
   for (const GnssChannel& channel : tracker_->channels()) {
     const Ephemeris& e = ephemerides_[static_cast<std::size_t>(channel.prn - 1)];

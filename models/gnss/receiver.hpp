@@ -55,7 +55,8 @@ struct SkySector {
 ///               sector_fault(): nothing from that part of the sky. "slip G07": that many
 ///               cycles (halves allowed) are added to the phase at each epoch at which it is not 0.
 ///               "restart": 1 warm, 2 cold. "clock_jump_s": added to the bias at each epoch.
-///               "freeze": the solution repeats itself. bias_fault(): the solution is off by a
+///               "freeze": the solution repeats itself. "noise": it is so many times as noisy as
+///               it says. bias_fault(): the solution is off by a
 ///               vector in ECEF. "week_offset": weeks added to every week in the headers.
 ///               "withhold", "withhold G07": no ephemeris is received. Of each message: "corrupt":
 ///               that many bits are turned over, "cut": that many bytes are missing at its end.

@@ -289,6 +289,28 @@ TEST(GnssReceiverFaultTest, SolutionFreezesAndIsBiased) {
   EXPECT_EQ(got[16].position(), truth[16].position());
 }
 
+TEST(GnssReceiverFaultTest, SolutionIsNoisierThanItSays) {
+  GnssReceiverOptions exact = every_second();
+  exact.sigma_position_m = exact.sigma_velocity_mps = 0;
+  ReceiverScene scene(every_second()), usual(every_second()), truth(exact);
+  scene.run_until(10s), usual.run_until(30s), truth.run_until(30s);
+  scene.io().faults["noise"] = 20;
+  scene.run_until(20s);
+  scene.io().faults.clear();
+  scene.run_until(30s);
+  const auto got = scene.frames(novatel::kBestXyzId), same = usual.frames(novatel::kBestXyzId),
+             zero = truth.frames(novatel::kBestXyzId);
+  constexpr std::size_t kSigma = 32;  // three floats after the position
+  for (std::size_t i = 5; i <= 30; ++i) {
+    const Vec3 noise = same[i].position() - zero[i].position();
+    const double times = i > 10 && i <= 20 ? 20 : 1;
+    // Positions of 7e6 m are written to 1e-9 m, which the factor enlarges.
+    EXPECT_LT(norm(got[i].position() - zero[i].position() - times * noise), 1e-7) << i;
+    EXPECT_GT(norm(noise), 0.01) << i;
+    EXPECT_EQ(got[i].body<float>(kSigma), same[i].body<float>(kSigma)) << i;
+  }
+}
+
 TEST(GnssReceiverFaultTest, NamesThatCarryNumbersAreRead) {
   GnssReceiver receiver;
   const auto refused = [](const char* name) {
