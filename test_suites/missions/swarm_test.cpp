@@ -2,9 +2,9 @@
 // does not collide, invents no mode, leaks nothing, and finds back once the last fault is over.
 //
 // Runs are the seeds of Seeds(12); --orrery_runs=200 flies the 200 of a soak. A failure prints its
-// seed; with --orrery_shrink the faults that matter. Seeds 7 and 128 and four more of the first 200
-// found that navigation never recovered from a start on a frozen receiver's fix (two faults of 26,
-// after 24 re-runs); RelativeNavigationTest keeps that.
+// seed; with --orrery_shrink the faults that matter. Six of the first 200 seeds failed to
+// find back; the one that was shrunk, 7, showed that navigation never recovered from a start on a
+// frozen receiver's fix (two faults of 26, after 24 re-runs). RelativeNavigationTest keeps that.
 #include <orrery/orrery.hpp>
 
 #include <algorithm>
@@ -119,7 +119,7 @@ struct FormationSwarmTest : FormationTest, testing::WithParamInterface<RunId> {
 };
 
 // Bounds. Separation: the safe ellipses keep 100 m radial/cross-track, of which a burn that is lost
-// or comes late takes a part; 30 m is the size of what must not touch, with a margin of ten. Heap:
+// or comes late takes a part; 30 m is a third of the small ellipse: a choice. Heap:
 // the package allocates at boot only, so what is live after each call is what was live after the
 // first ones. Recovery: two hours after the last fault, that is 1.25 orbits, navigation is as good
 // as that of an undisturbed run (0.3 m rms; 4 sigma of 1.16 m for a single estimate), and the
