@@ -41,13 +41,26 @@ function(orrery_room library)
 endfunction()
 
 # Most of a build's time goes into test sources: templates of GoogleTest, instantiated once. They are
-# optimised little, with line numbers only; what they link is built as the build type says.
+# optimised little, with line numbers only; what they link is built as the build type says. Under the
+# sanitizers they are not optimised and are watched for addresses alone, which takes a third of the time:
+# the code under test is watched for undefined behaviour, too.
+set(orrery_test_options "$<$<CONFIG:RelWithDebInfo>:-O1;-g1>")
+if(ORRERY_SANITIZE)
+  set(orrery_test_options "$<$<CONFIG:RelWithDebInfo>:-O0;-g1>")
+endif()
+if(ORRERY_SANITIZE MATCHES undefined)
+  list(APPEND orrery_test_options -fno-sanitize=undefined)
+endif()
+add_library(orrery_test_options INTERFACE)
+target_compile_options(orrery_test_options INTERFACE ${orrery_test_options}
+  # g++ 12 sees overruns in std::string's operator+ that are none (GCC bug 105329).
+  "$<$<COMPILE_LANG_AND_ID:CXX,GNU>:-Wno-array-bounds;-Wno-restrict;-Wno-stringop-overflow>"
+  $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-fpch-preprocess>   # what ccache needs to see through it
+  "$<$<COMPILE_LANG_AND_ID:CXX,Clang>:SHELL:-Xclang -fno-pch-timestamp>")
+
+# Call it last: the options must follow those of everything else that the target links.
 function(orrery_compile_as_test name)
-  target_compile_options(${name} PRIVATE "$<$<CONFIG:RelWithDebInfo>:-O1;-g1>"
-    # g++ 12 sees overruns in std::string's operator+ that are none (GCC bug 105329).
-    "$<$<COMPILE_LANG_AND_ID:CXX,GNU>:-Wno-array-bounds;-Wno-restrict;-Wno-stringop-overflow>"
-    $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-fpch-preprocess>   # what ccache needs to see through it
-    "$<$<COMPILE_LANG_AND_ID:CXX,Clang>:SHELL:-Xclang -fno-pch-timestamp>")
+  target_link_libraries(${name} PRIVATE orrery_test_options)
 endfunction()
 
 # GoogleTest and the standard headers that tests use, parsed once for all suites. An executable, since a
@@ -61,8 +74,25 @@ function(orrery_precompile_for_suites)
     <limits> <map> <memory> <optional> <random> <sstream> <stdexcept> <string> <string_view> <vector>)
 endfunction()
 
+# The same for the programs that fly something: all of them include <orrery/orrery.hpp>.
+function(orrery_precompile_for_flight_suites)
+  orrery_add_program_that_flies(orrery_flight_precompiled ${PROJECT_SOURCE_DIR}/test_suites/precompiled.cpp)
+  set_target_properties(orrery_flight_precompiled PROPERTIES EXCLUDE_FROM_ALL ON)
+  orrery_use_project_flags(orrery_flight_precompiled)
+  orrery_compile_as_test(orrery_flight_precompiled)
+  target_precompile_headers(orrery_flight_precompiled PRIVATE
+    $<$<COMPILE_LANGUAGE:CXX>:<orrery/orrery.hpp$<ANGLE-R>>)
+endfunction()
+
+# orrery_flight_suite(name ...): orrery_add_test for a program of the project itself.
+function(orrery_flight_suite name)
+  orrery_add_test(${name} ${ARGN})
+  orrery_compile_as_test(${name})
+  target_precompile_headers(${name} REUSE_FROM orrery_flight_precompiled)
+endfunction()
+
 # orrery_suite(name SOURCES ... LINK ... LABELS ...): a GoogleTest program of the project itself that
-# needs no flight library. Programs that fly something use orrery_add_test.
+# needs no flight library. Programs that fly something use orrery_flight_suite.
 function(orrery_suite name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "SOURCES;LINK;LABELS")
   add_executable(${name} ${arg_SOURCES})

@@ -54,10 +54,8 @@ function(orrery_add_test name)
     message(FATAL_ERROR "orrery_add_test(${name}): SHARDS ${arg_SHARDS} is not a positive number")
   endif()
 
-  include(${CMAKE_CURRENT_FUNCTION_LIST_DIR}/OrreryNumerics.cmake)
-  add_executable(${name} ${arg_SOURCES})
-  target_link_libraries(${name} PRIVATE orrery::fixtures orrery::main orrery::allocator ${arg_LINK})
-  target_compile_options(${name} PRIVATE ${ORRERY_NUMERIC_FLAGS})
+  orrery_add_program_that_flies(${name} ${arg_SOURCES})
+  target_link_libraries(${name} PRIVATE ${arg_LINK})
   orrery_use_project_flags(${name})
   orrery_name_flight_targets(${name} ${arg_FLIGHT})
   if(DEFINED arg_SHARDS)
@@ -68,6 +66,13 @@ function(orrery_add_test name)
 endfunction()
 
 # ---- internal
+
+function(orrery_add_program_that_flies name)
+  include(${CMAKE_CURRENT_FUNCTION_LIST_DIR}/OrreryNumerics.cmake)
+  add_executable(${name} ${ARGN})
+  target_link_libraries(${name} PRIVATE orrery::fixtures orrery::main orrery::allocator)
+  target_compile_options(${name} PRIVATE ${ORRERY_NUMERIC_FLAGS})
+endfunction()
 
 # Reads the arg_* of the caller's cmake_parse_arguments.
 function(orrery_check_arguments call required)
