@@ -5,6 +5,9 @@
 #include <cstring>
 
 namespace formation_keeping {
+
+using namespace flight_support;
+
 namespace {
 
 constexpr std::size_t kMaxLine = 128;

@@ -6,6 +6,9 @@
 #include "support/crc32.h"
 
 namespace formation_keeping {
+
+using namespace flight_support;
+
 namespace {
 
 constexpr unsigned char kMagicAndVersion[3] = {0x46, 0x4B, 1};

@@ -14,9 +14,11 @@
 
 #include <cstdint>
 
-#include "gnss_fix.hpp"
+#include "support/gnss_fix.hpp"
 
 namespace formation_keeping {
+
+using flight_support::GnssFix;
 
 enum class Role : std::uint8_t { kChief = 0, kDeputy = 1 };
 

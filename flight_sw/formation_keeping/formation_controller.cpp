@@ -2,9 +2,12 @@
 
 #include <cmath>
 
-#include "constants.hpp"
+#include "support/orbit/constants.hpp"
 
 namespace formation_keeping {
+
+using namespace flight_support;
+
 namespace {
 
 constexpr double kMaxGoal_m = 5000.0;

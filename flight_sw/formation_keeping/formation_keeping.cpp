@@ -5,15 +5,18 @@
 #include <cstring>
 
 #include "configuration.hpp"
-#include "constants.hpp"
 #include "crosslink_protocol.hpp"
 #include "formation_controller.hpp"
 #include "formation_keeping_messages.h"
 #include "orrery_flight.hpp"
 #include "orrery_messages.h"
 #include "relative_navigation.hpp"
+#include "support/orbit/constants.hpp"
 
 namespace formation_keeping {
+
+using namespace flight_support;
+
 namespace {
 
 using flight_support::Vec3;

@@ -2,6 +2,8 @@
 
 namespace formation_keeping {
 
+using namespace flight_support;
+
 bool measure(Gaussian* state, const RelativeElements& z, const Matrix6& R, double gate) {
   const Matrix6& P = state->covariance;
   const Matrix6 S = P + R;

@@ -1,9 +1,13 @@
 /// A Gaussian over six elements, and its direct measurement.
 #pragma once
 
-#include "relative_elements.hpp"
+#include "support/orbit/relative_elements.hpp"
 
 namespace formation_keeping {
+
+using flight_support::Matrix6;
+using flight_support::OrbitElements;
+using flight_support::RelativeElements;
 
 struct Gaussian {
   RelativeElements mean;

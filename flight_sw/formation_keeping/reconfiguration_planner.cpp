@@ -3,10 +3,14 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "closed_form_impulses.hpp"
-#include "constants.hpp"
+#include "support/orbit/closed_form_impulses.hpp"
+#include "support/orbit/constants.hpp"
+#include "support/orbit/passive_safety.hpp"
 
 namespace formation_keeping {
+
+using namespace flight_support;
+
 namespace {
 
 using flight_support::Vec3;
@@ -265,6 +269,11 @@ class Selection {
 };
 
 }  // namespace
+
+double plan_safe_distance_m(const FormationState& now, const Plan& plan) {
+  return flight_support::plan_safe_distance_m({now.t_ns, now.chief, now.relative.mean}, plan.burns,
+                                              plan.count);
+}
 
 RelativeElements predicted_miss(const FormationState& now, const Goal& goal) {
   return goal.a_roe -

@@ -4,9 +4,12 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "constants.hpp"
+#include "support/orbit/constants.hpp"
 
 namespace formation_keeping {
+
+using namespace flight_support;
+
 namespace {
 
 using flight_support::Matrix;

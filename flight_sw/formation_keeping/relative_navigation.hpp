@@ -21,9 +21,15 @@
 #include <cstdint>
 
 #include "gaussian.hpp"
-#include "gnss_fix.hpp"
+#include "support/gnss_fix.hpp"
+#include "support/orbit/burn.hpp"
+#include "support/orbit/relative_elements.hpp"
 
 namespace formation_keeping {
+
+using flight_support::Burn;
+using flight_support::EarthTime;
+using flight_support::GnssFix;
 
 struct NavigationOptions {
   EarthTime earth_time;
@@ -34,12 +40,6 @@ struct NavigationOptions {
   double absolute_noise_mps15 = 3e-4;
   double burn_error_fraction = 0.02;  ///< 1-sigma per axis, of the commanded delta-v
   double gate = 33.0;                 ///< see measure()
-};
-
-/// A burn as commanded: middle of it, and delta-v in the deputy's RTN at that instant.
-struct Burn {
-  std::int64_t t_ns = 0;
-  flight_support::Vec3 dv_RTN;
 };
 
 /// The estimate at one instant.

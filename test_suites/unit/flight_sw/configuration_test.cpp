@@ -6,6 +6,9 @@
 #include <string>
 
 namespace formation_keeping {
+
+using namespace flight_support;
+
 namespace {
 
 using testing::HasSubstr;

@@ -8,6 +8,9 @@
 #include "formation_keeping_messages.h"
 
 namespace formation_keeping {
+
+using namespace flight_support;
+
 namespace {
 
 using Message = std::array<unsigned char, kCrosslinkBytes>;

@@ -1,11 +1,11 @@
-#include "formation_keeping/earth_rotation.hpp"
+#include "support/orbit/earth_rotation.hpp"
 
 #include <erfa.h>
 #include <gtest/gtest.h>
 
 #include "flight_test_support.hpp"
 
-namespace formation_keeping {
+namespace flight_support {
 namespace {
 
 constexpr double kArcsec_rad = kPi / 648000.0;
@@ -83,4 +83,4 @@ TEST(EarthRotationTest, VelocityIsTheDerivativeOfPosition) {
 }
 
 }  // namespace
-}  // namespace formation_keeping
+}  // namespace flight_support

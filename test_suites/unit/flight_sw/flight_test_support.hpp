@@ -7,19 +7,19 @@
 #include <cstring>
 #include <vector>
 
-#include "formation_keeping/constants.hpp"
-#include "formation_keeping/gnss_fix.hpp"
-#include "formation_keeping/relative_elements.hpp"
 #include "orrery_messages.h"
+#include "support/gnss_fix.hpp"
+#include "support/orbit/constants.hpp"
+#include "support/orbit/relative_elements.hpp"
 
 namespace flight_test {
 
+using flight_support::OrbitElements;
+using flight_support::StateEci;
 using flight_support::Vec3;
-using formation_keeping::OrbitElements;
-using formation_keeping::StateEci;
 
 /// 2025-03-20 00:00:00 GPST, of the reference mission: week 2358, Thursday.
-constexpr std::int64_t kEpoch_ns = (2358LL * 604800 + 4 * 86400) * formation_keeping::kSecond_ns;
+constexpr std::int64_t kEpoch_ns = (2358LL * 604800 + 4 * 86400) * flight_support::kSecond_ns;
 
 /// The chief of the reference mission.
 inline OrbitElements reference_chief() {
@@ -27,14 +27,14 @@ inline OrbitElements reference_chief() {
   chief.a_m = 6928137.0;
   chief.ex = 0.0006;
   chief.ey = 0.0008;
-  chief.i_rad = 97.59 * formation_keeping::kPi / 180.0;
+  chief.i_rad = 97.59 * flight_support::kPi / 180.0;
   chief.raan_rad = 5.48;
   chief.u_rad = 0.7;
   return chief;
 }
 
-inline formation_keeping::RelativeElements roe(double da, double dl, double dex, double dey,
-                                               double dix, double diy) {
+inline flight_support::RelativeElements roe(double da, double dl, double dex, double dey,
+                                            double dix, double diy) {
   return {{{da}, {dl}, {dex}, {dey}, {dix}, {diy}}};
 }
 
@@ -65,16 +65,16 @@ inline void seal(std::vector<unsigned char>* frame) {
 }
 
 /// A BESTXYZ log as a receiver sends it; offsets as in NovAtel's manual.
-inline std::vector<unsigned char> bestxyz_frame(const formation_keeping::GnssFix& fix) {
+inline std::vector<unsigned char> bestxyz_frame(const flight_support::GnssFix& fix) {
   std::vector<unsigned char> frame(28 + 112 + 4, 0);
   frame[0] = 0xAA, frame[1] = 0x44, frame[2] = 0x12, frame[3] = 28;
   put_u16(&frame, 4, 241);
   frame[7] = 0x20;
   put_u16(&frame, 8, 112);
   frame[13] = 180;  // FINESTEERING
-  put_u16(&frame, 14, static_cast<unsigned>(fix.epoch_ns / formation_keeping::kWeek_ns));
+  put_u16(&frame, 14, static_cast<unsigned>(fix.epoch_ns / flight_support::kWeek_ns));
   orrery_put_u32(&frame[16],
-                 static_cast<std::uint32_t>(fix.epoch_ns % formation_keeping::kWeek_ns / 1000000));
+                 static_cast<std::uint32_t>(fix.epoch_ns % flight_support::kWeek_ns / 1000000));
   orrery_put_u32(&frame[28 + 4], 16);  // SINGLE
   orrery_put_u32(&frame[28 + 48], 8);  // DOPPLER_VELOCITY
   for (std::size_t k = 0; k < 3; ++k) {
@@ -120,7 +120,7 @@ class Noise {
 /// Acceleration of an oblate Earth [m/s^2], in Cartesian form: Vallado, Fundamentals (2013),
 /// §8.7.1.
 inline Vec3 oblate_acceleration_ECI(const Vec3& r) {
-  using namespace formation_keeping;
+  using namespace flight_support;
   const double r2 = dot(r, r), d = std::sqrt(r2);
   const double k = 1.5 * kJ2 * kRadiusEarth_m * kRadiusEarth_m / r2;
   const double z2 = 5.0 * r[2] * r[2] / r2;
@@ -146,17 +146,17 @@ inline StateEci propagate_oblate(StateEci s, double dt_s) {
 }
 
 inline StateEci state_of_mean(const OrbitElements& mean) {
-  return formation_keeping::state_from_osculating(formation_keeping::osculating_from_mean(mean));
+  return flight_support::state_from_osculating(flight_support::osculating_from_mean(mean));
 }
 inline OrbitElements mean_of_state(const StateEci& state) {
-  return formation_keeping::mean_from_osculating(formation_keeping::osculating_from_state(state));
+  return flight_support::mean_from_osculating(flight_support::osculating_from_state(state));
 }
 
 /// What a GNSS receiver says of `state`, with noise of 1.5 m and 30 mm/s per axis (Table 2 of the
 /// paper).
-inline formation_keeping::GnssFix noisy_fix(std::int64_t epoch_ns, const StateEci& state,
-                                            Noise* noise) {
-  using namespace formation_keeping;
+inline flight_support::GnssFix noisy_fix(std::int64_t epoch_ns, const StateEci& state,
+                                         Noise* noise) {
+  using namespace flight_support;
   const flight_support::Mat3 R_EI = transpose(ecef_to_eci(epoch_ns, EarthTime()));
   const Vec3 omega = flight_support::vec3(0, 0, kEarthRotation_radps);
   GnssFix fix;

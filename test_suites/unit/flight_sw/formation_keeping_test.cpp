@@ -12,6 +12,9 @@
 #include "orrery_flight.h"
 
 namespace formation_keeping {
+
+using namespace flight_support;
+
 namespace {
 
 using flight_test::kEpoch_ns;

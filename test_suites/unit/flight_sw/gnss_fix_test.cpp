@@ -1,10 +1,10 @@
-#include "formation_keeping/gnss_fix.hpp"
+#include "support/gnss_fix.hpp"
 
 #include <gtest/gtest.h>
 
 #include "flight_test_support.hpp"
 
-namespace formation_keeping {
+namespace flight_support {
 namespace {
 
 using Bytes = std::vector<unsigned char>;
@@ -163,4 +163,4 @@ TEST(GnssFixTest, WhatIsNoSpacecraftIsNoFix) {
 }
 
 }  // namespace
-}  // namespace formation_keeping
+}  // namespace flight_support

@@ -1,10 +1,10 @@
-#include "formation_keeping/mean_elements.hpp"
+#include "support/orbit/mean_elements.hpp"
 
 #include <gtest/gtest.h>
 
 #include "flight_test_support.hpp"
 
-namespace formation_keeping {
+namespace flight_support {
 namespace {
 
 using flight_test::reference_chief;
@@ -145,4 +145,4 @@ TEST(MeanElementsTest, TheReferenceOrbitIsSunSynchronous) {
 }
 
 }  // namespace
-}  // namespace formation_keeping
+}  // namespace flight_support

@@ -1,10 +1,10 @@
-#include "formation_keeping/relative_elements.hpp"
+#include "support/orbit/relative_elements.hpp"
 
 #include <gtest/gtest.h>
 
 #include "flight_test_support.hpp"
 
-namespace formation_keeping {
+namespace flight_support {
 namespace {
 
 using flight_test::reference_chief;
@@ -170,4 +170,4 @@ TEST(RelativeElementsTest, RtnAxesPointWhereTheirNamesSay) {
 }
 
 }  // namespace
-}  // namespace formation_keeping
+}  // namespace flight_support

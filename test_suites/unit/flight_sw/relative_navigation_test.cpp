@@ -7,6 +7,9 @@
 #include "flight_test_support.hpp"
 
 namespace formation_keeping {
+
+using namespace flight_support;
+
 namespace {
 
 using flight_test::kEpoch_ns;

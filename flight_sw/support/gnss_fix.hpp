@@ -6,15 +6,15 @@
 #include "support/matrix.hpp"
 #include "support/novatel/novatel.h"
 
-namespace formation_keeping {
+namespace flight_support {
 
 /// A position and velocity solution of one receiver, of its antenna.
 struct GnssFix {
-  std::int64_t epoch_ns = 0;    ///< GPS ns since 1980-01-06
-  flight_support::Vec3 r_ECEF;  ///< [m]
-  flight_support::Vec3 v_ECEF;  ///< [m/s], relative to the rotating Earth
-  double sigma_r_m = 0.0;       ///< 1-sigma per axis: root mean square of the three axes
-  double sigma_v_mps = 0.0;     ///< likewise
+  std::int64_t epoch_ns = 0;  ///< GPS ns since 1980-01-06
+  Vec3 r_ECEF;                ///< [m]
+  Vec3 v_ECEF;                ///< [m/s], relative to the rotating Earth
+  double sigma_r_m = 0.0;     ///< 1-sigma per axis: root mean square of the three axes
+  double sigma_v_mps = 0.0;   ///< likewise
 };
 
 /// Finite, between 6300 km and 50000 km from the Earth's centre, slower than 12 km/s, sigmas above
@@ -33,4 +33,4 @@ constexpr std::size_t kGnssRoomBytes = 28 + 112 + 4;
 /// computed, no time, not plausible.
 bool read_fix(const novatel_frame& frame, GnssFix* fix);
 
-}  // namespace formation_keeping
+}  // namespace flight_support

@@ -15,12 +15,12 @@
 
 #include "relative_elements.hpp"
 
-namespace formation_keeping {
+namespace flight_support {
 
 /// An instant for a burn, and what one there does to a_roe at the end [m per m/s].
 struct Opportunity {
   std::int64_t t_ns;
-  flight_support::Matrix<6, 3> effect;
+  Matrix<6, 3> effect;
 };
 
 constexpr int kMaxOpportunities = 24;
@@ -51,4 +51,4 @@ RelativeElements effect_of(const BurnChoice& choice, const Impulses& impulses);
 /// Sum of the magnitudes; parts at one instant are one vector [m/s].
 double delta_v_mps(const BurnChoice& choice, const Impulses& impulses);
 
-}  // namespace formation_keeping
+}  // namespace flight_support

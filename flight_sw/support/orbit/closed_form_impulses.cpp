@@ -2,12 +2,8 @@
 
 #include <cmath>
 
-namespace formation_keeping {
+namespace flight_support {
 namespace {
-
-using flight_support::Matrix;
-using flight_support::vec3;
-using flight_support::Vector;
 
 // Rows a*da, a*de along the phase, a*dl: in this order of precedence, as the number of burns
 // allows.
@@ -39,7 +35,7 @@ bool solve_square(const TangentialSystem& system, double* p) {
     for (int c = 0; c < N; ++c) A(r, c) = system.row[r][c];
     b[r] = system.right[r];
   }
-  if (!flight_support::solve(A, b, &x)) return false;
+  if (!solve(A, b, &x)) return false;
   for (int k = 0; k < N; ++k) p[k] += x[k];
   return true;
 }
@@ -63,7 +59,7 @@ bool solve_least(const TangentialSystem& system, int count, double* p) {
       }
     }
   }
-  if (!flight_support::solve(AAt, b, &y)) return false;
+  if (!solve(AAt, b, &y)) return false;
   for (int k = 0; k < count; ++k) {
     for (int r = 0; r < 3; ++r) p[k] += scale[r] * system.row[r][k] * y[r];
   }
@@ -152,4 +148,4 @@ double delta_v_mps(const BurnChoice& choice, const Impulses& impulses) {
   return sum;
 }
 
-}  // namespace formation_keeping
+}  // namespace flight_support

@@ -12,10 +12,10 @@
 #include "mean_elements.hpp"
 #include "support/matrix.hpp"
 
-namespace formation_keeping {
+namespace flight_support {
 
-using RelativeElements = flight_support::Vector<6>;
-using Matrix6 = flight_support::Matrix<6, 6>;
+using RelativeElements = Vector<6>;
+using Matrix6 = Matrix<6, 6>;
 enum RelativeElement { kDa, kDl, kDex, kDey, kDix, kDiy };
 
 /// a_roe [m] of the deputy relative to the chief, both mean (or both osculating).
@@ -28,7 +28,7 @@ Matrix6 state_transition(const OrbitElements& chief, double dt_s);
 
 /// B with a_roe after = a_roe before + B dv_RTN, for a burn at the mean argument of latitude in
 /// `orbit`.
-flight_support::Matrix<6, 3> control_input(const OrbitElements& orbit);
+Matrix<6, 3> control_input(const OrbitElements& orbit);
 
 /// Deputy less chief in the chief's RTN [m, m/s], derivative taken in RTN, from a_roe: rows x_R,
 /// y_T, z_N, vx, vy, vz. Near-circular and linear.
@@ -43,12 +43,12 @@ Matrix6 relative_elements_from_inertial_rtn(double u_rad, double n_radps);
 double minimum_radial_normal_m(const RelativeElements& a_roe);
 
 /// Unit vectors R, T, N as rows: R_HI, which turns ECI components into RTN components.
-flight_support::Mat3 eci_to_rtn(const StateEci& state);
+Mat3 eci_to_rtn(const StateEci& state);
 
 /// Deputy relative to chief in the chief's RTN, derivative taken in RTN; exact.
 struct RelativeStateRtn {
-  flight_support::Vec3 r_DC_RTN, v_DC_RTN;
+  Vec3 r_DC_RTN, v_DC_RTN;
 };
 RelativeStateRtn relative_state_rtn(const StateEci& chief, const StateEci& deputy);
 
-}  // namespace formation_keeping
+}  // namespace flight_support

@@ -4,10 +4,15 @@
 
 #include "constants.hpp"
 
-namespace formation_keeping {
+namespace flight_support {
 namespace {
 
 constexpr double kHorizon_rev = 2.0;
+
+struct BurnList {
+  const Burn* burns;
+  int count;
+};
 
 double distance_while_coasting_m(const OrbitElements& chief, const RelativeElements& a_roe,
                                  double dt_s) {
@@ -18,7 +23,7 @@ double distance_while_coasting_m(const OrbitElements& chief, const RelativeEleme
 
 // Flies the burns of `plan` from `first` on, beginning with `a_roe` just before that one, for at
 // most `horizon_s`; then coasts.
-double distance_from_m(const FormationState& now, const Plan& plan, int first,
+double distance_from_m(const RelativeOrbit& now, const BurnList& plan, int first,
                        RelativeElements a_roe, std::int64_t t_ns, double horizon_s) {
   const std::int64_t end_ns = t_ns + nanoseconds(horizon_s);
   double smallest = minimum_radial_normal_m(a_roe);
@@ -38,11 +43,12 @@ double distance_from_m(const FormationState& now, const Plan& plan, int first,
 
 }  // namespace
 
-double plan_safe_distance_m(const FormationState& now, const Plan& plan) {
+double plan_safe_distance_m(const RelativeOrbit& now, const Burn* burns, int count) {
+  const BurnList plan{burns, count};
   const double horizon_s = kHorizon_rev * kTwoPi / mean_motion_radps(now.chief.a_m);
   const double all_s =
       plan.count > 0 ? seconds(plan.burns[plan.count - 1].t_ns - now.t_ns) + horizon_s : horizon_s;
-  RelativeElements a_roe = now.relative.mean;
+  RelativeElements a_roe = now.a_roe;
   double smallest = distance_from_m(now, plan, 0, a_roe, now.t_ns, all_s);
   std::int64_t t_ns = now.t_ns;
   for (int k = 0; k < plan.count; ++k) {
@@ -58,4 +64,4 @@ double plan_safe_distance_m(const FormationState& now, const Plan& plan) {
   return smallest;
 }
 
-}  // namespace formation_keeping
+}  // namespace flight_support

@@ -4,11 +4,8 @@
 
 #include "constants.hpp"
 
-namespace formation_keeping {
+namespace flight_support {
 namespace {
-
-using flight_support::Mat3;
-using flight_support::Vec3;
 
 constexpr double kArcsec_rad = kPi / (180.0 * 3600.0);
 constexpr double kDegree_rad = kPi / 180.0;
@@ -115,8 +112,8 @@ Mat3 ecef_to_eci(std::int64_t epoch_ns, const EarthTime& earth_time) {
 StateEci eci_from_ecef(std::int64_t epoch_ns, const Vec3& r_ECEF, const Vec3& v_ECEF,
                        const EarthTime& earth_time) {
   const Mat3 R_IE = ecef_to_eci(epoch_ns, earth_time);
-  const Vec3 omega_EI_E = flight_support::vec3(0.0, 0.0, kEarthRotation_radps);
+  const Vec3 omega_EI_E = vec3(0.0, 0.0, kEarthRotation_radps);
   return {R_IE * r_ECEF, R_IE * (v_ECEF + cross(omega_EI_E, r_ECEF))};
 }
 
-}  // namespace formation_keeping
+}  // namespace flight_support

@@ -13,7 +13,7 @@
 
 #include "support/matrix.hpp"
 
-namespace formation_keeping {
+namespace flight_support {
 
 /// What an onboard clock of GPS time does not know; uploaded when it changes.
 struct EarthTime {
@@ -23,16 +23,16 @@ struct EarthTime {
 
 /// Position [m] and velocity [m/s] in EME2000.
 struct StateEci {
-  flight_support::Vec3 r_ECI;
-  flight_support::Vec3 v_ECI;
+  Vec3 r_ECI;
+  Vec3 v_ECI;
 };
 
 /// R_IE, which turns components in ECEF into components in ECI.
 /// @param epoch_ns  GPS time, ns since 1980-01-06.
-flight_support::Mat3 ecef_to_eci(std::int64_t epoch_ns, const EarthTime& earth_time);
+Mat3 ecef_to_eci(std::int64_t epoch_ns, const EarthTime& earth_time);
 
 /// Turns a position and a velocity relative to the rotating Earth into ECI.
-StateEci eci_from_ecef(std::int64_t epoch_ns, const flight_support::Vec3& r_ECEF,
-                       const flight_support::Vec3& v_ECEF, const EarthTime& earth_time);
+StateEci eci_from_ecef(std::int64_t epoch_ns, const Vec3& r_ECEF, const Vec3& v_ECEF,
+                       const EarthTime& earth_time);
 
-}  // namespace formation_keeping
+}  // namespace flight_support

@@ -15,7 +15,7 @@
 
 #include "earth_rotation.hpp"
 
-namespace formation_keeping {
+namespace flight_support {
 
 struct OrbitElements {
   double a_m = 0.0;
@@ -48,4 +48,4 @@ SecularRates secular_rates(const OrbitElements& mean);
 /// The mean elements `dt_s` later (or earlier).
 OrbitElements propagate_mean(const OrbitElements& mean, double dt_s);
 
-}  // namespace formation_keeping
+}  // namespace flight_support

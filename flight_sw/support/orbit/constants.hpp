@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-namespace formation_keeping {
+namespace flight_support {
 
 // GGM05S (Tapley et al. 2013): the header's mu and radius, and J2 = -sqrt(5) C20.
 constexpr double kMuEarth_m3ps2 = 3.986004415e14;
@@ -26,4 +26,4 @@ constexpr std::int64_t nanoseconds(double s) {
   return static_cast<std::int64_t>(s * 1e9 + (s < 0.0 ? -0.5 : 0.5));
 }
 
-}  // namespace formation_keeping
+}  // namespace flight_support

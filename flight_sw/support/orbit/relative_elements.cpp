@@ -4,11 +4,7 @@
 
 #include "constants.hpp"
 
-namespace formation_keeping {
-
-using flight_support::Mat3;
-using flight_support::Matrix;
-using flight_support::Vec3;
+namespace flight_support {
 
 RelativeElements relative_elements(const OrbitElements& chief, const OrbitElements& deputy) {
   const double draan = wrap_pi(deputy.raan_rad - chief.raan_rad);
@@ -140,11 +136,10 @@ RelativeStateRtn relative_state_rtn(const StateEci& chief, const StateEci& deput
   const double r2 = dot(chief.r_ECI, chief.r_ECI);
   // RTN turns about N at h / r^2; its turn about R, by J2, is 1e-3 of that and comes from the
   // force, not from the state, so it is left out here as everywhere.
-  const Vec3 omega_HI_H =
-      flight_support::vec3(0.0, 0.0, norm(cross(chief.r_ECI, chief.v_ECI)) / r2);
+  const Vec3 omega_HI_H = vec3(0.0, 0.0, norm(cross(chief.r_ECI, chief.v_ECI)) / r2);
   const Vec3 r_DC_RTN = R_HI * (deputy.r_ECI - chief.r_ECI);
   const Vec3 v_DC_RTN = R_HI * (deputy.v_ECI - chief.v_ECI) - cross(omega_HI_H, r_DC_RTN);
   return {r_DC_RTN, v_DC_RTN};
 }
 
-}  // namespace formation_keeping
+}  // namespace flight_support

@@ -4,11 +4,8 @@
 
 #include "constants.hpp"
 
-namespace formation_keeping {
+namespace flight_support {
 namespace {
-
-using flight_support::Vec3;
-using flight_support::vec3;
 
 // Where in the orbit: theta is the true argument of latitude.
 struct InPlane {
@@ -237,4 +234,4 @@ OrbitElements propagate_mean(const OrbitElements& mean, double dt_s) {
   return later;
 }
 
-}  // namespace formation_keeping
+}  // namespace flight_support

@@ -2,9 +2,9 @@
 
 #include <cmath>
 
-#include "constants.hpp"
+#include "support/orbit/constants.hpp"
 
-namespace formation_keeping {
+namespace flight_support {
 namespace {
 
 // Anything outside is not a spacecraft near the Earth; it would only poison the filter.
@@ -13,14 +13,14 @@ constexpr double kMaxRadius_m = 5.0e7;
 constexpr double kMaxSpeed_mps = 1.2e4;
 constexpr std::int64_t kMaxEpoch_ns = 6200 * kWeek_ns;
 
-flight_support::Vec3 to_vec3(const double* v) {
-  return flight_support::vec3(v[0], v[1], v[2]);
+Vec3 to_vec3(const double* v) {
+  return vec3(v[0], v[1], v[2]);
 }
 
 double rms(const float* sigma) {
-  const flight_support::Vec3 s = flight_support::vec3(
-      static_cast<double>(sigma[0]), static_cast<double>(sigma[1]), static_cast<double>(sigma[2]));
-  return std::sqrt(flight_support::dot(s, s) / 3.0);
+  const Vec3 s = vec3(static_cast<double>(sigma[0]), static_cast<double>(sigma[1]),
+                      static_cast<double>(sigma[2]));
+  return std::sqrt(dot(s, s) / 3.0);
 }
 
 bool has_solution(const novatel_bestxyz& log) {
@@ -31,8 +31,8 @@ bool has_solution(const novatel_bestxyz& log) {
 }  // namespace
 
 bool is_plausible(const GnssFix& fix) {
-  const double r = flight_support::norm(fix.r_ECEF);
-  const double v = flight_support::norm(fix.v_ECEF);
+  const double r = norm(fix.r_ECEF);
+  const double v = norm(fix.v_ECEF);
   // Written so that a NaN is not plausible.
   return r > kMinRadius_m && r < kMaxRadius_m && v < kMaxSpeed_mps && fix.sigma_r_m > 0.0 &&
          std::isfinite(fix.sigma_r_m) && fix.epoch_ns > 0 && fix.epoch_ns < kMaxEpoch_ns &&
@@ -61,4 +61,4 @@ bool read_fix(const novatel_frame& frame, GnssFix* fix) {
   return true;
 }
 
-}  // namespace formation_keeping
+}  // namespace flight_support
