@@ -1,0 +1,126 @@
+/// The filter: absolute and relative orbit of two spacecraft, their clocks and carrier-phase
+/// ambiguities, in the order of state_order.hpp.
+///
+/// Orbits      Gravity to degree and order 20 (orbit_pair.hpp) and empirical accelerations in RTN,
+///             first-order Gauss-Markov. The empirical acceleration of the companion is that of
+///             self plus a much smaller difference, since both leave out almost the same field:
+///             that is process noise with a correlation near 1.
+/// Clocks      White from epoch to epoch, started from the codes: nothing is assumed of steering.
+/// GRAPHIC     (code + phase) / 2 of one receiver: no ionosphere, half an ambiguity.
+/// SDCP        Phase of other less phase of self; no satellite clock, no ionosphere to speak of.
+///             Both are predicted at the true instant of reception, tag less clock error.
+/// Screening   A scalar beyond `gate` sigmas is left out. Twice in a row: that satellite's
+///             ambiguities start anew. Most of them, twice: all ambiguities, then also the relative
+///             orbit; at last the filter says that it has lost its way.
+/// Integers    resolve() in integer_resolution.hpp.
+/// Checked by  test_suites/unit/flight_sw/formation_gnc/formation_filter_test.cpp
+#pragma once
+
+#include <cstdint>
+
+#include "formation_gnc/navigation/carrier_arcs.hpp"
+#include "formation_gnc/navigation/integer_resolution.hpp"
+#include "formation_gnc/navigation/maneuver.hpp"
+#include "formation_gnc/navigation/orbit_pair.hpp"
+#include "formation_gnc/navigation/signal_geometry.hpp"
+#include "formation_gnc/navigation/ud_factor.hpp"
+
+namespace formation_gnc {
+
+struct FilterOptions {
+  OrbitPairOptions orbit = {};
+
+  /// Empirical acceleration of self, 1 sigma [m/s^2]; 2e-5 covers what a field of 20x20 omits at
+  /// 550 km.
+  double empirical_sigma_mps2 = 2e-5;
+  double empirical_tau_s = 200.0;
+  /// Of the difference: differential drag and radiation, and per metre of separation the omitted
+  /// gravity gradient [1/s^2].
+  double relative_sigma_mps2 = 2e-9;
+  double relative_sigma_per_m = 1e-10;
+
+  Vec3 lever_arm_B = flight_support::vec3(0.05, 0.0, 0.10);  ///< antenna from centre of mass [m]
+  double broadcast_sigma_m = 0.7;  ///< GPS orbits, as white noise of GRAPHIC
+  double phase_floor_m = 3e-4;  ///< added to the thermal noise of each phase: multipath, attitude
+  double gate = 5.0;            ///< sigmas
+
+  double start_sigma_r_m = 5.0;  ///< at least, of a start from the receiver's fix
+  double start_sigma_v_mps = 0.1;
+  double start_sigma_relative_r_m = 5.0;
+  double start_sigma_relative_v_mps = 0.1;
+  double clock_sigma_m = 100.0;
+  double ambiguity_sigma_cycles = 60.0;  ///< must cover code noise and twice the ionosphere
+
+  IntegerOptions integers = {};
+};
+
+/// What one update did, for monitoring; chi2 is the sum of nu^2 / S of all scalars tried that were
+/// not rejected.
+struct UpdateReport {
+  int used = 0, rejected = 0;
+  double chi2 = 0.0;
+};
+
+class FormationFilter {
+ public:
+  explicit FormationFilter(const FilterOptions& options = {});
+
+  /// Starts self's orbit [ECI, centre of mass]; sigmas per axis.
+  void start(std::int64_t t_ns, const Vec3& r_ECI, const Vec3& v_ECI, double sigma_r_m,
+             double sigma_v_mps);
+  /// Starts the companion's orbit relative to self's.
+  void start_other(const Vec3& r_ECI, const Vec3& v_ECI, double sigma_r_m, double sigma_v_mps);
+
+  // The four functions of the paper's Table 5; callable alone, in this order at an epoch.
+
+  /// To `t_ns` (not before the filter's time), over the manoeuvres in between.
+  void time_update(std::int64_t t_ns, const ManeuverList& maneuvers);
+  /// GRAPHIC of one receiver at the filter's time. `satellites` holds those of this epoch.
+  UpdateReport graphic_update(Who who, const GnssEpoch& epoch, const Quaternion& q_BI,
+                              const SatelliteTable& satellites);
+  /// Differences of the phases of both, after graphic_update() of both.
+  UpdateReport sdcp_update(const GnssEpoch& self, const Quaternion& q_self, const GnssEpoch& other,
+                           const Quaternion& q_other, const SatelliteTable& satellites);
+  /// Tries to fix ambiguities to integers, and holds them.
+  IntegerReport resolve_ambiguities();
+
+  bool started() const { return started_; }
+  bool other_started() const { return other_started_; }
+  /// True: neither new ambiguities nor an open relative orbit made measurements fit; start anew.
+  bool lost() const { return lost_; }
+  std::int64_t t_ns() const { return t_ns_; }
+  const OrbitPair& orbits() const { return orbits_; }
+  const UdFactor& covariance() const { return ud_; }
+  double clock_m(Who who) const { return clock_m_[static_cast<int>(who)]; }
+  const CarrierArcs& arcs(Who who) const { return arcs_[static_cast<int>(who)]; }
+  const IntegerSet& integers() const { return integers_; }
+  const FilterOptions& options() const { return options_; }
+
+ private:
+  struct Innovations;
+
+  void step(std::int64_t t_ns, const ManeuverList& maneuvers);
+  void apply_maneuver(const Maneuver& maneuver, double share);
+  void move_covariance(const OrbitPair& before, double dt_s);
+  void track_arcs(Who who, const GnssEpoch& epoch, const Predicted* predicted);
+  void start_ambiguity(Who who, int channel, double cycles);
+  void take(const SparseRow& h, double r, double innovation, UpdateReport* report, bool* rejected);
+  void settle();
+  void judge(const UpdateReport& report);
+  void release(int prn);
+  void reset_ambiguities();
+  void open_relative_orbit();
+
+  FilterOptions options_;
+  bool started_ = false, other_started_ = false, lost_ = false;
+  std::int8_t bad_epochs_ = 0, resets_in_a_row_ = 0;
+  std::int64_t t_ns_ = 0;
+  OrbitPair orbits_;
+  double clock_m_[2] = {};
+  CarrierArcs arcs_[2];
+  IntegerSet integers_;
+  UdFactor ud_;
+  double correction_[kStates] = {};  // of the nominal state, pending within an update
+};
+
+}  // namespace formation_gnc

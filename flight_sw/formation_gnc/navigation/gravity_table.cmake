@@ -1,0 +1,16 @@
+# Run at build time: cmake -D INPUT=<gfc> -D OUTPUT=<inc> -D DEGREE=<n> -P gravity_table.cmake
+# Writes the rows of degree 2 to n, in the order of the file, as initialisers {n, m, C, S}.
+file(STRINGS ${INPUT} rows REGEX "^gfc ")
+set(text "// Made from models/data/ggm05s_d60.gfc by gravity_table.cmake: GGM05S, fully normalised.\n")
+foreach(row IN LISTS rows)
+  string(REGEX REPLACE " +" ";" cells "${row}")
+  list(GET cells 1 n)
+  if(n GREATER DEGREE)
+    continue()
+  endif()
+  list(GET cells 2 m)
+  list(GET cells 3 c)
+  list(GET cells 4 s)
+  string(APPEND text "{${n}, ${m}, ${c}, ${s}},\n")
+endforeach()
+file(WRITE ${OUTPUT} "${text}")
