@@ -10,6 +10,7 @@ namespace {
 constexpr double kArcsec_rad = kPi / (180.0 * 3600.0);
 constexpr double kDegree_rad = kPi / 180.0;
 constexpr double kDay_s = 86400.0;
+constexpr std::int64_t kDay_ns = 86400 * kSecond_ns;
 constexpr double kCentury_d = 36525.0;
 constexpr double kJ2000SinceGpsEpoch_d = 7300.5;  // JD 2451545.0 - JD 2444244.5
 constexpr double kTtMinusGps_s = 51.184;          // TT - TAI + TAI - GPS = 32.184 + 19
@@ -26,18 +27,6 @@ Mat3 rotation_y(double angle_rad) {
 Mat3 rotation_z(double angle_rad) {
   const double c = std::cos(angle_rad), s = std::sin(angle_rad);
   return Mat3{{{c, s, 0}, {-s, c, 0}, {0, 0, 1}}};
-}
-
-// Lieske et al. (1977): mean equator of J2000 to mean equator of date.
-Mat3 precession(double t_cy) {
-  const double zeta = (2306.2181 + (0.30188 + 0.017998 * t_cy) * t_cy) * t_cy * kArcsec_rad;
-  const double z = (2306.2181 + (1.09468 + 0.018203 * t_cy) * t_cy) * t_cy * kArcsec_rad;
-  const double theta = (2004.3109 - (0.42665 + 0.041833 * t_cy) * t_cy) * t_cy * kArcsec_rad;
-  return rotation_z(-z) * rotation_y(theta) * rotation_z(-zeta);
-}
-
-double mean_obliquity_rad(double t_cy) {
-  return (84381.448 + (-46.8150 + (-0.00059 + 0.001813 * t_cy) * t_cy) * t_cy) * kArcsec_rad;
 }
 
 struct Nutation {
@@ -93,13 +82,29 @@ double gmst_rad(double whole_days_since_J2000, double extra_days) {
 
 }  // namespace
 
+double tt_centuries(std::int64_t epoch_ns) {
+  const double days = static_cast<double>(epoch_ns / kDay_ns) - kJ2000SinceGpsEpoch_d;
+  return (days + (seconds(epoch_ns % kDay_ns) + kTtMinusGps_s) / kDay_s) / kCentury_d;
+}
+
+// Lieske et al. (1977): mean equator of J2000 to mean equator of date.
+Mat3 precession(double t_cy) {
+  const double zeta = (2306.2181 + (0.30188 + 0.017998 * t_cy) * t_cy) * t_cy * kArcsec_rad;
+  const double z = (2306.2181 + (1.09468 + 0.018203 * t_cy) * t_cy) * t_cy * kArcsec_rad;
+  const double theta = (2004.3109 - (0.42665 + 0.041833 * t_cy) * t_cy) * t_cy * kArcsec_rad;
+  return rotation_z(-z) * rotation_y(theta) * rotation_z(-zeta);
+}
+
+double mean_obliquity_rad(double t_cy) {
+  return (84381.448 + (-46.8150 + (-0.00059 + 0.001813 * t_cy) * t_cy) * t_cy) * kArcsec_rad;
+}
+
 Mat3 ecef_to_eci(std::int64_t epoch_ns, const EarthTime& earth_time) {
-  const std::int64_t day_ns = 86400 * kSecond_ns;
-  const double days = static_cast<double>(epoch_ns / day_ns) - kJ2000SinceGpsEpoch_d;
-  const double second_of_day = seconds(epoch_ns % day_ns);
+  const double days = static_cast<double>(epoch_ns / kDay_ns) - kJ2000SinceGpsEpoch_d;
+  const double second_of_day = seconds(epoch_ns % kDay_ns);
   const double ut1_d =
       (second_of_day - earth_time.leap_seconds + earth_time.ut1_minus_utc_s) / kDay_s;
-  const double tt_cy = (days + (second_of_day + kTtMinusGps_s) / kDay_s) / kCentury_d;
+  const double tt_cy = tt_centuries(epoch_ns);
 
   const double obliquity = mean_obliquity_rad(tt_cy);
   const Nutation n = nutation(tt_cy);

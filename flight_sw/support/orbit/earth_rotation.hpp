@@ -27,6 +27,12 @@ struct StateEci {
   Vec3 v_ECI;
 };
 
+/// TT in Julian centuries since J2000.
+double tt_centuries(std::int64_t epoch_ns);
+/// Turns components in EME2000 into components in the mean equator and equinox of date.
+Mat3 precession(double tt_cy);
+double mean_obliquity_rad(double tt_cy);
+
 /// R_IE, which turns components in ECEF into components in ECI.
 /// @param epoch_ns  GPS time, ns since 1980-01-06.
 Mat3 ecef_to_eci(std::int64_t epoch_ns, const EarthTime& earth_time);
