@@ -1,5 +1,6 @@
 #include "formation_gnc/navigation/flight_gravity.hpp"
 
+#include "formation_gnc/navigation/pair.hpp"
 #include "support/orbit/constants.hpp"
 
 namespace formation_gnc {
@@ -59,9 +60,7 @@ constexpr Coefficients make_coefficients() {
 }
 constexpr Coefficients kField = make_coefficients();
 
-// The two points side by side. Compilers turn this into one vector operation each.
-typedef double Pair __attribute__((vector_size(16)));
-
+// The two points side by side.
 struct Harmonics {
   Pair v[kRows][kRows], w[kRows][kRows];  // [m][n]
 };

@@ -97,28 +97,46 @@ class FormationFilter {
   const FilterOptions& options() const { return options_; }
 
  private:
-  struct Innovations;
+  struct Sight;
 
-  void step(std::int64_t t_ns, const ManeuverList& maneuvers);
+  double relative_sigma_mps2() const;
+  void forget_clocks();
+  void step_to(std::int64_t t_ns);
+  void step(std::int64_t t_ns);
   void apply_maneuver(const Maneuver& maneuver, double share);
-  void move_covariance(const OrbitPair& before, double dt_s);
-  void track_arcs(Who who, const GnssEpoch& epoch, const Predicted* predicted);
-  void start_ambiguity(Who who, int channel, double cycles);
-  void take(const SparseRow& h, double r, double innovation, UpdateReport* report, bool* rejected);
+
+  AntennaState antenna(int who, const Quaternion& q_BI) const;
+  void look(int who, const GnssEpoch& epoch, const Quaternion& q_BI,
+            const SatelliteTable& satellites, Sight* sight) const;
+  void start_clock(int who, Sight* sight);
+  void start_ambiguity(int who, int channel, const Observation& observation);
+  void track_arcs(int who, const Sight& sight);
+  bool take(const SparseRow& h, double r, double innovation, UpdateReport* report);
+  void take_difference(const Observation& o_self, const Predicted& p_self,
+                       const Observation& o_other, const Predicted& p_other, UpdateReport* report);
   void settle();
+
   void judge(const UpdateReport& report);
   void release(int prn);
   void reset_ambiguities();
   void open_relative_orbit();
 
+  int find_candidates(IntegerCandidate* candidates) const;
+  int find_reference(const IntegerCandidate* candidates, int count) const;
+  int hold(const IntegerChoice& choice, const IntegerCandidate& reference, int fewest);
+  void constrain(const IntegerCandidate& difference, const IntegerCandidate& reference,
+                 double innovation);
+
   FilterOptions options_;
   bool started_ = false, other_started_ = false, lost_ = false;
-  std::int8_t bad_epochs_ = 0, resets_in_a_row_ = 0;
+  std::uint8_t bad_epochs_ = 0, good_epochs_ = 0, resets_in_a_row_ = 0;
   std::int64_t t_ns_ = 0;
   OrbitPair orbits_;
+  EarthAttitude earth_;  // kept, since its base holds for many steps
   double clock_m_[2] = {};
   CarrierArcs arcs_[2];
   IntegerSet integers_;
+  IntegerTrials trials_;
   UdFactor ud_;
   double correction_[kStates] = {};  // of the nominal state, pending within an update
 };

@@ -44,13 +44,15 @@ class GnssDecoder {
 
  private:
   bool take(const novatel_frame& frame);
-  void begin(std::int64_t t_ns);
+  bool is_complete() const;
+  What give();
 
   unsigned char room_[4096];
   novatel_framer framer_;
   GnssEpoch waiting_, given_;
-  bool has_range_ = false, has_fix_log_ = false;
-  bool next_has_range_ = false, next_has_fix_log_ = false;
+  bool has_range_ = false, has_fix_log_ = false;  // of what is waiting
+  GnssEpoch held_;                                // begun by the log that showed the end of another
+  bool held_back_ = false, held_has_range_ = false;
   BroadcastEphemeris ephemeris_;
   std::uint32_t bytes_dropped_ = 0;
 };

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "formation_gnc/navigation/state_order.hpp"
+#include "formation_gnc/navigation/ud_factor.hpp"
 
 namespace formation_gnc {
 
@@ -35,11 +36,51 @@ class IntegerSet {
   void hold(int prn, std::int32_t value);
   /// One that is left alone says nothing and goes too.
   void release(int prn);
-  void release_all() { *this = IntegerSet(); }
+  void release_all() { held_ = 0; }
 
  private:
   std::uint64_t held_ = 0;  // bit prn
   std::int32_t value_[33] = {};
 };
+
+/// What the attempts so far agreed on.
+class IntegerTrials {
+ public:
+  /// Notes the integer of a difference that passed all tests. @return how often in a row by now.
+  int note(int prn, int reference_prn, std::int32_t value);
+  /// Ends the rows that were not continued since the last call.
+  void end_attempt();
+  void forget(int prn) { streak_[prn] = 0; }
+  int reference() const { return reference_; }
+
+ private:
+  std::uint8_t reference_ = 0;
+  bool noted_[33] = {};
+  std::uint8_t streak_[33] = {};
+  std::int32_t value_[33] = {};
+};
+
+/// A satellite whose phases of both receivers may be differenced and fixed.
+struct IntegerCandidate {
+  int prn = 0;
+  int channel_self = 0, channel_other = 0;
+  double cycles = 0.0;  ///< float N_other - N_self
+  double lock_s = 0.0;  ///< the shorter of both
+  bool held = false;
+};
+
+/// Differences to the reference that the tests accept, after partial fixing.
+struct IntegerChoice {
+  int count = 0;
+  IntegerCandidate difference[kChannels];
+  std::int32_t value[kChannels];
+  double success_rate = 0.0, ratio = 0.0;
+};
+
+/// Float double differences and their covariance, solved; the least certain are left out until
+/// success rate and ratio pass, or `fewest` would not be left.
+IntegerChoice choose_integers(const IntegerCandidate* candidates, int count,
+                              const IntegerCandidate& reference, const UdFactor& covariance,
+                              int fewest, const IntegerOptions& options);
 
 }  // namespace formation_gnc

@@ -63,6 +63,13 @@ struct NavigationStatistics {
   std::uint32_t restarts = 0;  ///< from the receiver's fix, the first start included
 };
 
+/// Of the epoch processed last.
+struct UpdateReports {
+  std::int64_t t_ns = 0;
+  UpdateReport graphic_self, graphic_other, sdcp;
+  IntegerReport integers;
+};
+
 class Navigation {
  public:
   explicit Navigation(const NavigationOptions& options = {});
@@ -83,23 +90,34 @@ class Navigation {
 
   const FormationFilter& filter() const { return filter_; }
   const NavigationStatistics& statistics() const { return statistics_; }
+  const UpdateReports& reports() const { return reports_; }
   /// Forgets everything but ephemerides and manoeuvres; starts anew from the next fix.
   void reset();
 
  private:
   void insert(Who who, const GnssEpoch& epoch, const Quaternion& q_BI);
-  void replay_from(int entry);
-  void own_phase(EpochEntry& entry);
+  bool accept_time(Who who, std::int64_t t_ns);
+  /// Works off entries from `first` on, the filter standing behind the one before.
+  void process_from(int first);
+  /// Puts the filter behind entry k, companion's measurements included.
+  void rewind_behind(int k);
+  void own_phase(EpochEntry* entry);
   void remote_phase(const EpochEntry& entry);
-  void advance_to(std::int64_t t_ns);
-  void run_delayed();
+  void restart_if_lost(const EpochEntry& entry);
+  std::int64_t newest_own_ns() const;
 
   NavigationOptions options_;
   EphemerisStore ephemerides_;
   FormationFilter filter_;
+  SatelliteTable satellites_;
+  EarthAttitude earth_;
   EpochRing ring_;
+  int processed_ = 0;  // entries of the ring that the filter has passed
   ManeuverList maneuvers_;
   NavigationStatistics statistics_;
+  UpdateReports reports_;
+  std::int64_t last_own_ns_ = 0, last_remote_ns_ = 0;
+  int strange_times_ = 0;  // own epochs in a row that lie before what is known
 };
 
 }  // namespace formation_gnc

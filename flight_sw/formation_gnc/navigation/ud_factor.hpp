@@ -9,6 +9,7 @@
 /// states. Checked by  test_suites/unit/flight_sw/formation_gnc/ud_factor_test.cpp
 #pragma once
 
+#include "formation_gnc/navigation/pair.hpp"
 #include "formation_gnc/navigation/state_order.hpp"
 #include "support/matrix.hpp"
 
@@ -41,16 +42,21 @@ struct OrbitNoise {
   double weight[9];
 };
 
+/// f = U^T h, which gating needs first and the update again.
+struct Projection {
+  double f[kStates];
+  double variance = 0.0;  ///< h^T P h
+};
+
 class UdFactor {
  public:
   /// All states independent, of variance 1.
   UdFactor();
 
-  /// h^T P h: variance of a prediction.
-  double variance_of(const SparseRow& h) const;
+  Projection project(const SparseRow& h) const;
   /// Takes in z = h^T x + e, var(e) = r > 0. @return the gain K, so that x += K (z - h^T x).
   /// @param gain  kStates numbers.
-  void measure(const SparseRow& h, double r, double* gain);
+  void measure(const Projection& h, double r, double* gain);
   /// P += w g g^T, w >= 0, for g that is zero behind state `last`.
   void add(double w, const double* g, int last);
   /// Forgets a state: independent of all others, with this variance > 0.
@@ -59,17 +65,23 @@ class UdFactor {
   void move_orbits(const OrbitTransition& transition, const OrbitNoise& self,
                    const OrbitNoise& difference);
 
-  double variance(int state) const;
   double covariance(int i, int j) const;
-  double u(int i, int j) const { return i == j ? 1.0 : upper_[offset(j) + i]; }  ///< i <= j
+  double variance(int state) const { return covariance(state, state); }
+  /// U(i, j), i <= j, and D(j).
+  double u(int i, int j) const { return i == j ? 1.0 : upper_[offset(j) + i / 2][i % 2]; }
   double d(int j) const { return d_[j]; }
 
  private:
-  static constexpr int offset(int column) { return column * (column - 1) / 2; }
-  double* column(int j) { return upper_ + offset(j); }
-  const double* column(int j) const { return upper_ + offset(j); }
+  // By columns, above the diagonal, in pairs; what is left over in a column's last pair is zero.
+  static constexpr int offset(int column) { return (column / 2) * ((column + 1) / 2); }
+  static constexpr int pairs(int column) { return (column + 1) / 2; }
+  void set(int i, int j, double value) { upper_[offset(j) + i / 2][i % 2] = value; }
 
-  double upper_[kStates * (kStates - 1) / 2] = {};  // by columns, above the diagonal
+  void move_rows(const OrbitTransition& transition, int column);
+  struct Weighted;
+  void refactor(Weighted* w);
+
+  Pair upper_[(kStates / 2) * ((kStates + 1) / 2)] = {};
   double d_[kStates];
 };
 

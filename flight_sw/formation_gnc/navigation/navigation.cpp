@@ -1,0 +1,220 @@
+#include "formation_gnc/navigation/navigation.hpp"
+
+#include <cmath>
+
+#include "support/orbit/constants.hpp"
+
+namespace formation_gnc {
+namespace {
+
+using flight_support::kSecond_ns;
+using flight_support::nanoseconds;
+
+// Own epochs that step back come from a receiver that found another time, if they keep doing so.
+constexpr int kStrangeTimesToRestart = 3;
+// Beyond this the orbits are started anew from a fix rather than moved that far.
+constexpr std::int64_t kLongestGap_ns = 3600 * kSecond_ns;
+// A companion's epoch ahead of all own ones by more is no epoch.
+constexpr std::int64_t kMostAhead_ns = 600 * kSecond_ns;
+
+struct FixEci {
+  Vec3 r, v;
+};
+
+// Of the centre of mass: the fix is that of the antenna.
+FixEci fix_of(const GnssEpoch& epoch, const Quaternion& q_BI, const FilterOptions& options) {
+  const flight_support::StateEci s = flight_support::eci_from_ecef(
+      epoch.t_ns, epoch.r_ECEF, epoch.v_ECEF, options.orbit.earth_time);
+  return {s.r_ECI - transpose(rotation_of(q_BI)) * options.lever_arm_B, s.v_ECI};
+}
+
+}  // namespace
+
+Navigation::Navigation(const NavigationOptions& options)
+    : options_(options), filter_(options.filter) {
+  if (options_.replay_depth < 2) options_.replay_depth = 2;
+  if (options_.replay_depth > EpochRing::kCapacity) options_.replay_depth = EpochRing::kCapacity;
+}
+
+void Navigation::reset() {
+  filter_ = FormationFilter(options_.filter);
+  ring_.clear();
+  processed_ = 0;
+  strange_times_ = 0;
+  last_own_ns_ = last_remote_ns_ = 0;
+}
+
+void Navigation::ephemeris(const BroadcastEphemeris& ephemeris) {
+  ephemerides_.add(ephemeris);
+}
+
+void Navigation::own_epoch(const GnssEpoch& epoch, const Quaternion& q_BI) {
+  insert(Who::kSelf, epoch, q_BI);
+}
+
+void Navigation::remote_epoch(const GnssEpoch& epoch, const Quaternion& q_BI) {
+  insert(Who::kOther, epoch, q_BI);
+}
+
+std::int64_t Navigation::newest_own_ns() const {
+  for (int k = ring_.count() - 1; k >= 0; --k) {
+    if (ring_[k].has_own) return ring_[k].t_ns;
+  }
+  return 0;
+}
+
+// Times that leap are those of a receiver or a companion that lost GPS time.
+bool Navigation::accept_time(Who who, std::int64_t t_ns) {
+  const std::int64_t newest_ns = newest_own_ns();
+  if (newest_ns == 0) return true;
+  if (who == Who::kOther) return t_ns - newest_ns <= kMostAhead_ns;
+  if (t_ns - newest_ns > kLongestGap_ns) {
+    reset();
+  } else if (t_ns < ring_[0].t_ns && ++strange_times_ >= kStrangeTimesToRestart) {
+    reset();
+  } else if (t_ns > newest_ns) {
+    strange_times_ = 0;
+  }
+  return true;
+}
+
+void Navigation::insert(Who who, const GnssEpoch& epoch, const Quaternion& q_BI) {
+  if (!is_plausible(epoch) || !accept_time(who, epoch.t_ns)) {
+    ++statistics_.dropped;
+    return;
+  }
+  const bool own = who == Who::kSelf;
+  int at = ring_.last_until(epoch.t_ns);
+  const bool known = at >= 0 && ring_[at].t_ns == epoch.t_ns;
+  if (known && (own ? ring_[at].has_own : ring_[at].has_remote)) {
+    ++statistics_.duplicates;
+    return;
+  }
+  // Can the filter go back to where it takes this in? Behind entry `at` it can; for an own epoch
+  // of an entry that is there already, behind the one before.
+  const int behind = known && own ? at - 1 : at;
+  const bool late = behind < processed_ - 1 || (known && processed_ > at);
+  const bool by_policy = options_.late == LatePolicy::kRewindReplay || own ||
+                         (options_.late == LatePolicy::kDiscard && known && at == processed_ - 1 &&
+                          at == ring_.count() - 1);
+  if (late && (behind < 0 || !by_policy)) {
+    ++statistics_.dropped;
+    return;
+  }
+  if (late && (known ? at < ring_.count() - 1 || own : true)) ++statistics_.late;
+  int restart = behind + 1;
+  if (!known) {
+    const int before = ring_.count();
+    at = ring_.insert(epoch.t_ns, options_.replay_depth);
+    if (at < 0) {
+      ++statistics_.dropped;
+      return;
+    }
+    if (ring_.count() == before && processed_ > 0) --processed_;
+    restart = at;
+  }
+  EpochEntry& entry = ring_[at];
+  (own ? entry.has_own : entry.has_remote) = true;
+  (own ? entry.own : entry.remote) = epoch;
+  (own ? entry.q_own : entry.q_remote) = q_BI;
+  ++(own ? statistics_.own_epochs : statistics_.remote_epochs);
+
+  if (known && !own && processed_ > at) {
+    rewind_behind(at);
+    process_from(at + 1);
+  } else {
+    if (processed_ > restart) rewind_behind(restart - 1);
+    process_from(restart < processed_ ? restart : processed_);
+  }
+}
+
+// The filter moved on from the snapshot that was taken before the companion's part of entry k.
+void Navigation::rewind_behind(int k) {
+  const bool at_end = k == processed_ - 1 && ring_[k].t_ns == filter_.t_ns();
+  if (!at_end || k < ring_.count() - 1) ++statistics_.replays;
+  filter_ = ring_[k].after_own;
+  remote_phase(ring_[k]);
+  processed_ = k + 1;
+}
+
+void Navigation::process_from(int first) {
+  const std::int64_t limit_ns = options_.late == LatePolicy::kFusionDelay
+                                    ? newest_own_ns() - nanoseconds(options_.fusion_delay_s)
+                                    : INT64_MAX;
+  for (int k = first; k < ring_.count() && ring_[k].t_ns <= limit_ns; ++k) {
+    if (k < ring_.count() - 1) ++statistics_.replayed_epochs;
+    own_phase(&ring_[k]);
+    remote_phase(ring_[k]);
+    processed_ = k + 1;
+  }
+}
+
+void Navigation::own_phase(EpochEntry* entry) {
+  filter_.time_update(entry->t_ns, maneuvers_);
+  restart_if_lost(*entry);
+  reports_ = UpdateReports();
+  reports_.t_ns = entry->t_ns;
+  if (entry->has_own && filter_.started()) {
+    satellites_.prepare(entry->own, ephemerides_, options_.filter.orbit.earth_time, &earth_);
+    reports_.graphic_self =
+        filter_.graphic_update(Who::kSelf, entry->own, entry->q_own, satellites_);
+    last_own_ns_ = entry->t_ns;
+  }
+  entry->after_own = filter_;
+}
+
+void Navigation::restart_if_lost(const EpochEntry& entry) {
+  if (!entry.has_own || !entry.own.has_fix) return;
+  if (filter_.started() && !filter_.lost()) return;
+  const FixEci fix = fix_of(entry.own, entry.q_own, options_.filter);
+  filter_.start(entry.t_ns, fix.r, fix.v, static_cast<double>(entry.own.sigma_r_m),
+                static_cast<double>(entry.own.sigma_v_mps));
+  ++statistics_.restarts;
+}
+
+void Navigation::remote_phase(const EpochEntry& entry) {
+  if (!entry.has_remote || !filter_.started()) return;
+  if (!filter_.other_started()) {
+    if (!entry.remote.has_fix) return;
+    const FixEci fix = fix_of(entry.remote, entry.q_remote, options_.filter);
+    filter_.start_other(fix.r, fix.v, static_cast<double>(entry.remote.sigma_r_m),
+                        static_cast<double>(entry.remote.sigma_v_mps));
+  }
+  satellites_.prepare(entry.remote, ephemerides_, options_.filter.orbit.earth_time, &earth_);
+  reports_.graphic_other =
+      filter_.graphic_update(Who::kOther, entry.remote, entry.q_remote, satellites_);
+  last_remote_ns_ = entry.t_ns;
+  if (!entry.has_own) return;
+  satellites_.prepare(entry.own, ephemerides_, options_.filter.orbit.earth_time, &earth_);
+  reports_.sdcp =
+      filter_.sdcp_update(entry.own, entry.q_own, entry.remote, entry.q_remote, satellites_);
+  reports_.integers = filter_.resolve_ambiguities();
+}
+
+void Navigation::maneuver(Who who, std::int64_t t_ns, const Vec3& dv_ECI, double sigma_mps) {
+  Maneuver m;
+  m.who = who;
+  m.t_ns = t_ns;
+  m.dv_ECI = dv_ECI;
+  m.sigma_mps = sigma_mps;
+  maneuver(m);
+}
+
+void Navigation::maneuver(const Maneuver& m) {
+  if (!maneuvers_.add(m)) {
+    ++statistics_.dropped;
+    return;
+  }
+  const std::int64_t begin_ns = m.t_ns - nanoseconds(m.duration_s) / 2;
+  if (!filter_.started() || begin_ns > filter_.t_ns()) return;
+  const int behind = ring_.last_until(begin_ns - 1);
+  if (behind < 0) {
+    ++statistics_.dropped;  // further back than can be undone: measurements will tell
+    return;
+  }
+  if (behind >= processed_ - 1) return;
+  rewind_behind(behind);
+  process_from(behind + 1);
+}
+
+}  // namespace formation_gnc

@@ -1,0 +1,181 @@
+#include "formation_gnc/navigation/ud_factor.hpp"
+
+namespace formation_gnc {
+namespace {
+
+// Rounding cannot bring a weight below zero, but can to zero; a floor far below any variance here.
+constexpr double kLeastWeight = 1e-40;
+
+constexpr int kSelf = kPositionSelf, kDifference = kPositionDifference;
+constexpr int kHalf = 9;  // states of one orbit
+
+void apply(const flight_support::Mat3& A, const double* x, double* y) {
+  for (int r = 0; r < 3; ++r) y[r] += A(r, 0) * x[0] + A(r, 1) * x[1] + A(r, 2) * x[2];
+}
+
+// y = Phi x of one orbit.
+void apply(const OrbitTransition& t, const double x[kHalf], double y[kHalf]) {
+  for (int k = 0; k < 6; ++k) y[k] = 0.0;
+  apply(t.rr, x, y);
+  apply(t.rv, x + 3, y);
+  apply(t.ra, x + 6, y);
+  apply(t.vr, x, y + 3);
+  apply(t.vv, x + 3, y + 3);
+  apply(t.va, x + 6, y + 3);
+  for (int k = 6; k < 9; ++k) y[k] = t.aa * x[k];
+}
+
+}  // namespace
+
+UdFactor::UdFactor() {
+  for (double& d : d_) d = 1.0;
+}
+
+Projection UdFactor::project(const SparseRow& h) const {
+  Pair dense[kStates / 2] = {};
+  bool used[kStates / 2] = {};
+  for (int k = 0; k < h.count; ++k) {
+    dense[h.state[k] / 2][h.state[k] % 2] = h.value[k];
+    used[h.state[k] / 2] = true;
+  }
+  int list[SparseRow::kMost], count = 0;
+  for (int p = 0; p < kStates / 2; ++p) {
+    if (used[p]) list[count++] = p;
+  }
+  Projection out;
+  for (int j = 0; j < kStates; ++j) {
+    const Pair* column = upper_ + offset(j);
+    Pair sum = {0.0, 0.0};
+    for (int k = 0; k < count && list[k] < pairs(j); ++k) sum += dense[list[k]] * column[list[k]];
+    out.f[j] = dense[j / 2][j % 2] + sum[0] + sum[1];
+    out.variance += out.f[j] * out.f[j] * d_[j];
+  }
+  return out;
+}
+
+void UdFactor::measure(const Projection& h, double r, double* gain) {
+  Pair b[kStates / 2] = {};
+  double alpha = r;
+  for (int j = 0; j < kStates; ++j) {
+    const double f = h.f[j];
+    if (f == 0.0) continue;
+    const double v = d_[j] * f, lambda = -f / alpha;
+    const double before = alpha;
+    alpha += f * v;
+    d_[j] *= before / alpha;
+    Pair* column = upper_ + offset(j);
+    for (int p = 0; p < pairs(j); ++p) {
+      const Pair u = column[p];
+      column[p] = u + lambda * b[p];
+      b[p] += v * u;
+    }
+    b[j / 2][j % 2] = v;
+  }
+  const double scale = 1.0 / alpha;
+  for (int j = 0; j < kStates; ++j) gain[j] = scale * b[j / 2][j % 2];
+}
+
+void UdFactor::add(double w, const double* g, int last) {
+  double x[kStates];
+  for (int j = 0; j <= last; ++j) x[j] = g[j];
+  for (int j = last; j >= 0 && w > 0.0; --j) {
+    const double s = x[j];
+    if (s == 0.0) continue;
+    const double d = d_[j] + w * s * s;
+    const double share = w * s / d;
+    w *= d_[j] / d;
+    d_[j] = d;
+    for (int i = 0; i < j; ++i) {
+      x[i] -= s * u(i, j);
+      set(i, j, u(i, j) + share * x[i]);
+    }
+  }
+}
+
+void UdFactor::forget(int state, double variance) {
+  double column[kStates];
+  for (int i = 0; i < state; ++i) {
+    column[i] = u(i, state);
+    set(i, state, 0.0);
+  }
+  for (int j = state + 1; j < kStates; ++j) set(state, j, 0.0);
+  if (state > 0) add(d_[state], column, state - 1);
+  d_[state] = variance;
+}
+
+/// Rows whose weighted squares are the covariance of the orbits: the difference's columns of U and
+/// of its noise first, then self's, so that the lower rows are zero in the second half.
+struct UdFactor::Weighted {
+  static constexpr int kPairs = 18, kLowerPairs = 9;
+  Pair row[kOrbitStates][kPairs] = {};
+  Pair weight[kPairs];
+
+  void set(int r, int c, double value) { row[r][c / 2][c % 2] = value; }
+};
+
+void UdFactor::move_rows(const OrbitTransition& transition, int column) {
+  double x[kHalf], y[kHalf];
+  for (int first = kSelf; first <= kDifference; first += kHalf) {
+    for (int k = 0; k < kHalf; ++k) x[k] = u(first + k, column);
+    apply(transition, x, y);
+    for (int k = 0; k < kHalf; ++k) set(first + k, column, y[k]);
+  }
+}
+
+void UdFactor::move_orbits(const OrbitTransition& transition, const OrbitNoise& self,
+                           const OrbitNoise& difference) {
+  Weighted w;
+  for (int c = 0; c < kOrbitStates; ++c) {
+    const int column = kSelf + c;
+    const int place = c < kHalf ? kOrbitStates + c : c - kHalf;
+    double x[kOrbitStates] = {}, y[kOrbitStates];
+    for (int k = 0; k <= c; ++k) x[k] = u(kSelf + k, column);
+    apply(transition, x, y);
+    apply(transition, x + kHalf, y + kHalf);
+    for (int k = 0; k < kOrbitStates; ++k) w.set(k, place, y[k]);
+    w.weight[place / 2][place % 2] = d_[column];
+  }
+  for (int c = 0; c < kHalf; ++c) {
+    const int lower = kHalf + c, upper = kOrbitStates + kHalf + c;
+    for (int k = 0; k < kHalf; ++k) {
+      w.set(kHalf + k, lower, difference.column[c][k]);
+      w.set(k, upper, self.column[c][k]);
+    }
+    w.weight[lower / 2][lower % 2] = difference.weight[c];
+    w.weight[upper / 2][upper % 2] = self.weight[c];
+  }
+  refactor(&w);
+  for (int column = kAmbiguitySelf; column < kStates; ++column) move_rows(transition, column);
+}
+
+// Modified weighted Gram-Schmidt, from the last row up.
+void UdFactor::refactor(Weighted* w) {
+  Pair weighted[Weighted::kPairs];
+  for (int k = kOrbitStates - 1; k >= 0; --k) {
+    const int count = k >= kHalf ? Weighted::kLowerPairs : Weighted::kPairs;
+    const Pair* row = w->row[k];
+    Pair sum = {0.0, 0.0};
+    for (int p = 0; p < count; ++p) {
+      weighted[p] = w->weight[p] * row[p];
+      sum += weighted[p] * row[p];
+    }
+    const double d = sum[0] + sum[1] > kLeastWeight ? sum[0] + sum[1] : kLeastWeight;
+    d_[kSelf + k] = d;
+    for (int j = 0; j < k; ++j) {
+      Pair* other = w->row[j];
+      Pair product = {0.0, 0.0};
+      for (int p = 0; p < count; ++p) product += weighted[p] * other[p];
+      const double u_jk = (product[0] + product[1]) / d;
+      for (int p = 0; p < count; ++p) other[p] -= u_jk * row[p];
+      set(kSelf + j, kSelf + k, u_jk);
+    }
+  }
+}
+
+double UdFactor::covariance(int i, int j) const {
+  double sum = 0.0;
+  for (int k = i > j ? i : j; k < kStates; ++k) sum += u(i, k) * d_[k] * u(j, k);
+  return sum;
+}
+
+}  // namespace formation_gnc
