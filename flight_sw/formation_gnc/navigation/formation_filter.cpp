@@ -12,9 +12,15 @@ using flight_support::seconds;
 constexpr int kSelf = 0, kOther = 1;
 constexpr std::uint8_t kRejectionsToRestart = 2;
 constexpr int kBadEpochsToReset = 2;
+constexpr int kMostResets = 2;
+constexpr int kBadGraphicToRestart = 3;
 constexpr int kGoodEpochsToTrust = 10;
 constexpr int kFewestToJudge = 4;
-constexpr double kOpened_r_m = 20.0, kOpened_v_mps = 0.1;
+constexpr std::int64_t kWalkStep_ns = 60 * flight_support::kSecond_ns;
+// For a burn that was off by a few mm/s, and for anything else.
+constexpr int kOpenings = 2;
+constexpr double kOpened_r_m[kOpenings] = {0.1, 100.0}, kOpened_v_mps[kOpenings] = {0.005, 0.5};
+constexpr double kContradiction_sigmas = 5.0;
 
 double square(double x) {
   return x * x;
@@ -22,6 +28,22 @@ double square(double x) {
 
 int first_ambiguity(int who) {
   return who == kSelf ? kAmbiguitySelf : kAmbiguityOther;
+}
+
+// Of an epoch: the state is wrong then, not the measurements.
+bool most_rejected(const UpdateReport& report) {
+  const int tried = report.used + report.rejected;
+  return tried >= kFewestToJudge && 2 * report.rejected > tried;
+}
+
+// chi2 of as many degrees of freedom beyond what happens once in 3 million epochs (Wilson &
+// Hilferty 1931).
+bool contradicts(const UpdateReport& report) {
+  if (report.used + report.rejected < kFewestToJudge) return false;
+  if (most_rejected(report)) return true;
+  const double w = 2.0 / (9.0 * report.used);
+  const double root = 1.0 - w + kContradiction_sigmas * std::sqrt(w);
+  return report.chi2 > report.used * root * root * root;
 }
 
 double median(double* x, int count) {
@@ -45,7 +67,7 @@ FormationFilter::FormationFilter(const FilterOptions& options) : options_(option
 void FormationFilter::start(std::int64_t t_ns, const Vec3& r_ECI, const Vec3& v_ECI,
                             double sigma_r_m, double sigma_v_mps) {
   *this = FormationFilter(options_);
-  t_ns_ = t_ns;
+  t_ns_ = walked_ns_ = t_ns;
   started_ = true;
   const double r = std::fmax(sigma_r_m, options_.start_sigma_r_m);
   const double v = std::fmax(sigma_v_mps, options_.start_sigma_v_mps);
@@ -107,9 +129,26 @@ void FormationFilter::time_update(std::int64_t t_ns, const ManeuverList& maneuve
       }
     }
     step_to(next_ns);
-    if (next < 0) return;
+    if (next < 0) break;
     apply_maneuver(maneuvers[next], maneuvers.share(next, from_ns, t_ns));
     done[next] = true;
+  }
+  if (t_ns_ - walked_ns_ >= kWalkStep_ns) walk_ambiguities();
+}
+
+// In steps that are short against the change of geometry, but not at every epoch: it costs 12
+// additions of rank one.
+void FormationFilter::walk_ambiguities() {
+  const double sigma_cycles = options_.broadcast_walk_mps05 / (0.5 * kWavelength_m);
+  const double variance = square(sigma_cycles) * seconds(t_ns_ - walked_ns_);
+  walked_ns_ = t_ns_;
+  for (int prn = 1; prn <= 32; ++prn) {
+    const int at_self = arcs_[kSelf].find(prn), at_other = arcs_[kOther].find(prn);
+    double g[kStates] = {};
+    if (at_self >= 0) g[kAmbiguitySelf + at_self] = 1.0;
+    if (at_other >= 0) g[kAmbiguityOther + at_other] = 1.0;
+    const int last = at_other >= 0 ? kAmbiguityOther + at_other : kAmbiguitySelf + at_self;
+    if (at_self >= 0 || at_other >= 0) ud_.add(variance, g, last);
   }
 }
 
@@ -165,6 +204,25 @@ struct FormationFilter::Sight {
   const Observation* observation[kChannels];
   Predicted predicted[kChannels];
   int count = 0;
+
+  int find(int prn) const {
+    int k = count - 1;
+    while (k >= 0 && observation[k]->prn != prn) --k;
+    return k;
+  }
+};
+
+/// A scalar of sdcp_update(), and what it is made of.
+struct FormationFilter::Difference {
+  SparseRow h;
+  double r = 0.0, innovation = 0.0;
+  const Observation *self = nullptr, *other = nullptr;
+  int at_self = 0, at_other = 0;  // channels
+  bool rejected = false;
+};
+struct FormationFilter::Differences {
+  int count = 0;
+  Difference item[kChannels];
 };
 
 void FormationFilter::look(int who, const GnssEpoch& epoch, const Quaternion& q_BI,
@@ -203,6 +261,8 @@ void FormationFilter::start_ambiguity(int who, int channel, const Observation& o
   const double difference = o.phase_cycles - o.code_m / kWavelength_m;
   arc.base_cycles = std::nearbyint(difference);
   arc.ambiguity_cycles = difference - arc.base_cycles;
+  arc.lock_s = o.lock_s;
+  arc.last_ns = t_ns_;
   release(o.prn);
   const double sigma =
       std::hypot(options_.ambiguity_sigma_cycles,
@@ -287,85 +347,132 @@ UpdateReport FormationFilter::graphic_update(Who which, const GnssEpoch& epoch,
     h.add(first_ambiguity(who) + channel, 0.5 * kWavelength_m);
     const double measured_m = 0.5 * (o.code_m + phase_m(arc, o));
     const double predicted_m = p.range_m + 0.5 * kWavelength_m * arc.ambiguity_cycles;
-    const double r = square(0.5 * code_sigma_m(static_cast<double>(o.cn0_dBHz))) +
-                     square(options_.broadcast_sigma_m);
+    const double r =
+        square(0.5 * code_sigma_m(static_cast<double>(o.cn0_dBHz))) + square(options_.code_floor_m);
     take(h, r, measured_m - predicted_m, &report);
   }
   settle();
+  judge_graphic(who, report);
   return report;
+}
+
+// Codes do not lie by many sigmas in most channels: then it is the orbit.
+void FormationFilter::judge_graphic(int who, const UpdateReport& report) {
+  bad_graphic_[who] =
+      most_rejected(report) ? static_cast<std::uint8_t>(bad_graphic_[who] + 1) : std::uint8_t{0};
+  if (bad_graphic_[who] < kBadGraphicToRestart) return;
+  bad_graphic_[who] = 0;
+  if (who == kSelf) lost_ = true;
+  if (who == kOther) other_started_ = false;
 }
 
 UpdateReport FormationFilter::sdcp_update(const GnssEpoch& self, const Quaternion& q_self,
                                           const GnssEpoch& other, const Quaternion& q_other,
                                           const SatelliteTable& satellites) {
-  UpdateReport report;
   Sight a, b;
   look(kSelf, self, q_self, satellites, &a);
   look(kOther, other, q_other, satellites, &b);
+  Differences all;
   for (int k = 0; k < a.count; ++k) {
-    for (int j = 0; j < b.count; ++j) {
-      if (b.observation[j]->prn == a.observation[k]->prn) {
-        take_difference(*a.observation[k], a.predicted[k], *b.observation[j], b.predicted[j],
-                        &report);
-      }
-    }
+    const int j = b.find(a.observation[k]->prn);
+    if (j < 0) continue;
+    all.item[all.count++] =
+        difference(*a.observation[k], a.predicted[k], *b.observation[j], b.predicted[j]);
+  }
+  sort_by_doubt(&all);
+  const UdFactor before = ud_;
+  UpdateReport report = take_all(&all);
+  // Slips show in the lock times. When phases as a whole contradict the state nevertheless,
+  // somebody burned whom nobody told, or not as told: the orbit is opened, ambiguities and integers
+  // stay good.
+  for (int size = 0; size < kOpenings && contradicts(report); ++size) {
+    ud_ = before;
+    for (double& c : correction_) c = 0.0;
+    open_relative_orbit(kOpened_r_m[size], kOpened_v_mps[size]);
+    report = take_all(&all);
+    ++openings_;
   }
   settle();
-  judge(report);
+  judge(report, all);
   return report;
 }
 
-void FormationFilter::take_difference(const Observation& o_self, const Predicted& p_self,
-                                      const Observation& o_other, const Predicted& p_other,
-                                      UpdateReport* report) {
-  const int at_self = arcs_[kSelf].find(o_self.prn), at_other = arcs_[kOther].find(o_other.prn);
-  if (at_self < 0 || at_other < 0) return;
-  CarrierArc& self = arcs_[kSelf][at_self];
-  CarrierArc& other = arcs_[kOther][at_other];
-  SparseRow h;
-  h.add(kClockSelf, p_other.clock_factor - p_self.clock_factor);
-  h.add(kClockDifference, p_other.clock_factor);
-  for (int k = 0; k < 3; ++k) {
-    h.add(kPositionSelf + k, p_self.line_of_sight[k] - p_other.line_of_sight[k]);
+// The one in the middle first: it alone says what the clocks differ by, and one that slipped must
+// not.
+void FormationFilter::sort_by_doubt(Differences* all) const {
+  double innovation_m[kChannels];
+  for (int k = 0; k < all->count; ++k) innovation_m[k] = all->item[k].innovation;
+  const double middle_m = all->count > 0 ? median(innovation_m, all->count) : 0.0;
+  for (int i = 1; i < all->count; ++i) {
+    const Difference held = all->item[i];
+    const double doubt = std::fabs(held.innovation - middle_m);
+    int j = i;
+    for (; j > 0 && std::fabs(all->item[j - 1].innovation - middle_m) > doubt; --j) {
+      all->item[j] = all->item[j - 1];
+    }
+    all->item[j] = held;
   }
-  for (int k = 0; k < 3; ++k) h.add(kPositionDifference + k, -p_other.line_of_sight[k]);
-  h.add(kAmbiguitySelf + at_self, -kWavelength_m);
-  h.add(kAmbiguityOther + at_other, kWavelength_m);
-  const double measured_m = phase_m(other, o_other) - phase_m(self, o_self);
-  const double predicted_m = p_other.range_m - p_self.range_m +
-                             kWavelength_m * (other.ambiguity_cycles - self.ambiguity_cycles);
-  const double r = square(phase_sigma_m(static_cast<double>(o_self.cn0_dBHz))) +
-                   square(phase_sigma_m(static_cast<double>(o_other.cn0_dBHz))) +
-                   2.0 * square(options_.phase_floor_m);
-  if (take(h, r, measured_m - predicted_m, report)) {
-    self.rejections = other.rejections = 0;
-    return;
-  }
-  if (++other.rejections < kRejectionsToRestart) return;
-  // Which of both slipped cannot be told from the difference.
-  start_ambiguity(kSelf, at_self, o_self);
-  start_ambiguity(kOther, at_other, o_other);
-  arcs_[kSelf][at_self].lock_s = o_self.lock_s;
-  arcs_[kOther][at_other].lock_s = o_other.lock_s;
-  arcs_[kSelf][at_self].last_ns = arcs_[kOther][at_other].last_ns = t_ns_;
 }
 
-// Most of an epoch rejected means that the state is wrong, not the measurements.
-void FormationFilter::judge(const UpdateReport& report) {
-  const int tried = report.used + report.rejected;
-  if (tried < kFewestToJudge || 2 * report.rejected <= tried) {
+UpdateReport FormationFilter::take_all(Differences* all) {
+  UpdateReport report;
+  for (int k = 0; k < all->count; ++k) {
+    Difference& d = all->item[k];
+    d.rejected = !take(d.h, d.r, d.innovation, &report);
+  }
+  return report;
+}
+
+FormationFilter::Difference FormationFilter::difference(const Observation& o_self,
+                                                        const Predicted& p_self,
+                                                        const Observation& o_other,
+                                                        const Predicted& p_other) {
+  Difference d;
+  d.self = &o_self;
+  d.other = &o_other;
+  d.at_self = arcs_[kSelf].find(o_self.prn);
+  d.at_other = arcs_[kOther].find(o_other.prn);
+  const CarrierArc &self = arcs_[kSelf][d.at_self], &other = arcs_[kOther][d.at_other];
+  d.h.add(kClockSelf, p_other.clock_factor - p_self.clock_factor);
+  d.h.add(kClockDifference, p_other.clock_factor);
+  for (int k = 0; k < 3; ++k) {
+    d.h.add(kPositionSelf + k, p_self.line_of_sight[k] - p_other.line_of_sight[k]);
+  }
+  for (int k = 0; k < 3; ++k) d.h.add(kPositionDifference + k, -p_other.line_of_sight[k]);
+  d.h.add(kAmbiguitySelf + d.at_self, -kWavelength_m);
+  d.h.add(kAmbiguityOther + d.at_other, kWavelength_m);
+  d.innovation = phase_m(other, o_other) - phase_m(self, o_self) -
+                 (p_other.range_m - p_self.range_m) -
+                 kWavelength_m * (other.ambiguity_cycles - self.ambiguity_cycles);
+  d.r = square(phase_sigma_m(static_cast<double>(o_self.cn0_dBHz))) +
+        square(phase_sigma_m(static_cast<double>(o_other.cn0_dBHz))) +
+        2.0 * square(options_.phase_floor_m);
+  return d;
+}
+
+void FormationFilter::judge(const UpdateReport& report, const Differences& all) {
+  if (most_rejected(report)) {
+    good_epochs_ = 0;
+    if (++bad_epochs_ < kBadEpochsToReset) return;
     bad_epochs_ = 0;
-    if (tried >= kFewestToJudge && good_epochs_ < kGoodEpochsToTrust) ++good_epochs_;
-    if (good_epochs_ == kGoodEpochsToTrust) resets_in_a_row_ = 0;
+    reset_ambiguities();
+    if (++resets_in_a_row_ > kMostResets) lost_ = true;
     return;
   }
-  good_epochs_ = 0;
-  if (++bad_epochs_ < kBadEpochsToReset) return;
   bad_epochs_ = 0;
-  reset_ambiguities();
-  if (resets_in_a_row_ == 1) open_relative_orbit();
-  if (resets_in_a_row_ >= 2) lost_ = true;
-  ++resets_in_a_row_;
+  if (good_epochs_ < kGoodEpochsToTrust) ++good_epochs_;
+  if (good_epochs_ == kGoodEpochsToTrust) resets_in_a_row_ = 0;
+  for (int k = 0; k < all.count; ++k) {
+    std::uint8_t& rejections = arcs_[kOther][all.item[k].at_other].rejections;
+    rejections = all.item[k].rejected ? static_cast<std::uint8_t>(rejections + 1) : std::uint8_t{0};
+    if (rejections >= kRejectionsToRestart) restart_ambiguities(all.item[k]);
+  }
+}
+
+// Of both: which one slipped cannot be told from the difference.
+void FormationFilter::restart_ambiguities(const Difference& d) {
+  start_ambiguity(kSelf, d.at_self, *d.self);
+  start_ambiguity(kOther, d.at_other, *d.other);
 }
 
 void FormationFilter::release(int prn) {
@@ -381,14 +488,14 @@ void FormationFilter::reset_ambiguities() {
   trials_ = IntegerTrials();
 }
 
-void FormationFilter::open_relative_orbit() {
+void FormationFilter::open_relative_orbit(double sigma_r_m, double sigma_v_mps) {
   for (int k = 0; k < 3; ++k) {
     double g[kStates] = {};
     g[kPositionDifference + k] = 1.0;
-    ud_.add(square(kOpened_r_m), g, kPositionDifference + k);
+    ud_.add(square(sigma_r_m), g, kPositionDifference + k);
     g[kPositionDifference + k] = 0.0;
     g[kVelocityDifference + k] = 1.0;
-    ud_.add(square(kOpened_v_mps), g, kVelocityDifference + k);
+    ud_.add(square(sigma_v_mps), g, kVelocityDifference + k);
   }
 }
 

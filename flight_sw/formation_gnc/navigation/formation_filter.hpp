@@ -9,9 +9,12 @@
 /// GRAPHIC     (code + phase) / 2 of one receiver: no ionosphere, half an ambiguity.
 /// SDCP        Phase of other less phase of self; no satellite clock, no ionosphere to speak of.
 ///             Both are predicted at the true instant of reception, tag less clock error.
-/// Screening   A scalar beyond `gate` sigmas is left out. Twice in a row: that satellite's
-///             ambiguities start anew. Most of them, twice: all ambiguities, then also the relative
-///             orbit; at last the filter says that it has lost its way.
+/// Screening   A scalar beyond `gate` sigmas is left out; the same satellite twice in a row, and
+/// its
+///             ambiguities start anew. Most phases at once, while lock times show no slip, mean a
+///             burn that was not told: the relative orbit is opened, ambiguities stay. If that does
+///             not help either, all ambiguities start anew, and in the end the filter says that it
+///             is lost.
 /// Integers    resolve() in integer_resolution.hpp.
 /// Checked by  test_suites/unit/flight_sw/formation_gnc/formation_filter_test.cpp
 #pragma once
@@ -36,12 +39,15 @@ struct FilterOptions {
   double empirical_tau_s = 200.0;
   /// Of the difference: differential drag and radiation, and per metre of separation the omitted
   /// gravity gradient [1/s^2].
-  double relative_sigma_mps2 = 2e-9;
-  double relative_sigma_per_m = 1e-10;
+  double relative_sigma_mps2 = 1e-9;
+  double relative_sigma_per_m = 5e-11;
 
   Vec3 lever_arm_B = flight_support::vec3(0.05, 0.0, 0.10);  ///< antenna from centre of mass [m]
-  double broadcast_sigma_m = 0.7;  ///< GPS orbits, as white noise of GRAPHIC
-  double phase_floor_m = 3e-4;  ///< added to the thermal noise of each phase: multipath, attitude
+  /// Errors of GPS orbits along the line of sight change as the geometry turns: a random walk of
+  /// the ambiguities of both receivers together [m/sqrt(s)].
+  double broadcast_walk_mps05 = 0.008;
+  double code_floor_m = 0.02;   ///< added to the thermal noise of GRAPHIC
+  double phase_floor_m = 1e-4;  ///< added to the thermal noise of each phase: multipath, attitude
   double gate = 5.0;            ///< sigmas
 
   double start_sigma_r_m = 5.0;  ///< at least, of a start from the receiver's fix
@@ -88,6 +94,8 @@ class FormationFilter {
   bool other_started() const { return other_started_; }
   /// True: neither new ambiguities nor an open relative orbit made measurements fit; start anew.
   bool lost() const { return lost_; }
+  /// Times that the relative orbit was opened since most phases contradicted it: unknown burns.
+  std::uint32_t openings() const { return openings_; }
   std::int64_t t_ns() const { return t_ns_; }
   const OrbitPair& orbits() const { return orbits_; }
   const UdFactor& covariance() const { return ud_; }
@@ -95,15 +103,20 @@ class FormationFilter {
   const CarrierArcs& arcs(Who who) const { return arcs_[static_cast<int>(who)]; }
   const IntegerSet& integers() const { return integers_; }
   const FilterOptions& options() const { return options_; }
+  /// From the next attempt on, such as by ground command.
+  void set_integer_options(const IntegerOptions& integers) { options_.integers = integers; }
 
  private:
   struct Sight;
+  struct Difference;
+  struct Differences;
 
   double relative_sigma_mps2() const;
   void forget_clocks();
   void step_to(std::int64_t t_ns);
   void step(std::int64_t t_ns);
   void apply_maneuver(const Maneuver& maneuver, double share);
+  void walk_ambiguities();
 
   AntennaState antenna(int who, const Quaternion& q_BI) const;
   void look(int who, const GnssEpoch& epoch, const Quaternion& q_BI,
@@ -112,14 +125,18 @@ class FormationFilter {
   void start_ambiguity(int who, int channel, const Observation& observation);
   void track_arcs(int who, const Sight& sight);
   bool take(const SparseRow& h, double r, double innovation, UpdateReport* report);
-  void take_difference(const Observation& o_self, const Predicted& p_self,
-                       const Observation& o_other, const Predicted& p_other, UpdateReport* report);
+  Difference difference(const Observation& o_self, const Predicted& p_self,
+                        const Observation& o_other, const Predicted& p_other);
+  void sort_by_doubt(Differences* all) const;
+  UpdateReport take_all(Differences* all);
   void settle();
 
-  void judge(const UpdateReport& report);
+  void judge(const UpdateReport& report, const Differences& all);
+  void restart_ambiguities(const Difference& difference);
+  void judge_graphic(int who, const UpdateReport& report);
   void release(int prn);
   void reset_ambiguities();
-  void open_relative_orbit();
+  void open_relative_orbit(double sigma_r_m, double sigma_v_mps);
 
   int find_candidates(IntegerCandidate* candidates) const;
   int find_reference(const IntegerCandidate* candidates, int count) const;
@@ -130,7 +147,9 @@ class FormationFilter {
   FilterOptions options_;
   bool started_ = false, other_started_ = false, lost_ = false;
   std::uint8_t bad_epochs_ = 0, good_epochs_ = 0, resets_in_a_row_ = 0;
-  std::int64_t t_ns_ = 0;
+  std::uint8_t bad_graphic_[2] = {};
+  std::uint32_t openings_ = 0;
+  std::int64_t t_ns_ = 0, walked_ns_ = 0;
   OrbitPair orbits_;
   EarthAttitude earth_;  // kept, since its base holds for many steps
   double clock_m_[2] = {};

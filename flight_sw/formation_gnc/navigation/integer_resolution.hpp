@@ -12,7 +12,7 @@ struct IntegerOptions {
   bool enabled = true;
   double success_rate = 0.99999;
   double ratio = 3.0;
-  float lock_s = 60.0f;       ///< shorter arcs are not tried
+  float lock_s = 120.0f;      ///< shorter arcs are not tried
   int repetitions = 3;        ///< the same integers at so many attempts in a row
   int fewest_satellites = 5;  ///< of a first fix
   double hold_sigma_cycles = 0.01;

@@ -63,18 +63,19 @@ std::int64_t Navigation::newest_own_ns() const {
   return 0;
 }
 
-// Times that leap are those of a receiver or a companion that lost GPS time.
+// Times that leap are those of a receiver or a companion that lost GPS time. A receiver that keeps
+// to its new time is believed.
 bool Navigation::accept_time(Who who, std::int64_t t_ns) {
   const std::int64_t newest_ns = newest_own_ns();
   if (newest_ns == 0) return true;
   if (who == Who::kOther) return t_ns - newest_ns <= kMostAhead_ns;
-  if (t_ns - newest_ns > kLongestGap_ns) {
-    reset();
-  } else if (t_ns < ring_[0].t_ns && ++strange_times_ >= kStrangeTimesToRestart) {
-    reset();
-  } else if (t_ns > newest_ns) {
+  const bool strange = t_ns < ring_[0].t_ns || t_ns - newest_ns > kLongestGap_ns;
+  if (!strange) {
     strange_times_ = 0;
+    return true;
   }
+  if (++strange_times_ < kStrangeTimesToRestart) return false;
+  reset();
   return true;
 }
 
@@ -119,19 +120,20 @@ void Navigation::insert(Who who, const GnssEpoch& epoch, const Quaternion& q_BI)
   (own ? entry.q_own : entry.q_remote) = q_BI;
   ++(own ? statistics_.own_epochs : statistics_.remote_epochs);
 
-  if (known && !own && processed_ > at) {
+  if (known && !own && processed_ == at + 1) {
+    remote_phase(entry);  // the filter stands just there
+  } else if (known && !own && processed_ > at) {
     rewind_behind(at);
     process_from(at + 1);
   } else {
     if (processed_ > restart) rewind_behind(restart - 1);
-    process_from(restart < processed_ ? restart : processed_);
+    process_from(processed_);
   }
 }
 
-// The filter moved on from the snapshot that was taken before the companion's part of entry k.
+// From the snapshot that was taken before the companion's part of entry k.
 void Navigation::rewind_behind(int k) {
-  const bool at_end = k == processed_ - 1 && ring_[k].t_ns == filter_.t_ns();
-  if (!at_end || k < ring_.count() - 1) ++statistics_.replays;
+  ++statistics_.replays;
   filter_ = ring_[k].after_own;
   remote_phase(ring_[k]);
   processed_ = k + 1;

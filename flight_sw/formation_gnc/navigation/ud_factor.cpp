@@ -53,41 +53,50 @@ Projection UdFactor::project(const SparseRow& h) const {
   return out;
 }
 
+// Two columns at a time, an even one and the odd one behind it, which saves a third of the memory
+// traffic; each number goes through the operations of Bierman's loop in their order.
 void UdFactor::measure(const Projection& h, double r, double* gain) {
   Pair b[kStates / 2] = {};
   double alpha = r;
-  for (int j = 0; j < kStates; ++j) {
-    const double f = h.f[j];
-    if (f == 0.0) continue;
-    const double v = d_[j] * f, lambda = -f / alpha;
-    const double before = alpha;
-    alpha += f * v;
-    d_[j] *= before / alpha;
-    Pair* column = upper_ + offset(j);
-    for (int p = 0; p < pairs(j); ++p) {
-      const Pair u = column[p];
-      column[p] = u + lambda * b[p];
-      b[p] += v * u;
+  for (int j = 0; j < kStates; j += 2) {
+    const double v0 = d_[j] * h.f[j], v1 = d_[j + 1] * h.f[j + 1];
+    const double lambda0 = -h.f[j] / alpha;
+    const double middle = alpha + h.f[j] * v0;
+    const double lambda1 = -h.f[j + 1] / middle;
+    d_[j] *= alpha / middle;
+    alpha = middle + h.f[j + 1] * v1;
+    d_[j + 1] *= middle / alpha;
+    Pair *even = upper_ + offset(j), *odd = upper_ + offset(j + 1);
+    for (int p = 0; p < j / 2; ++p) {
+      const Pair u0 = even[p], u1 = odd[p], b0 = b[p], b1 = b0 + v0 * u0;
+      even[p] = u0 + lambda0 * b0;
+      odd[p] = u1 + lambda1 * b1;
+      b[p] = b1 + v1 * u1;
     }
-    b[j / 2][j % 2] = v;
+    // The odd column's last element stands beside the even one's diagonal.
+    const double u = odd[j / 2][0];
+    odd[j / 2][0] = u + lambda1 * v0;
+    b[j / 2] = Pair{v0 + v1 * u, v1};
   }
   const double scale = 1.0 / alpha;
   for (int j = 0; j < kStates; ++j) gain[j] = scale * b[j / 2][j % 2];
 }
 
 void UdFactor::add(double w, const double* g, int last) {
-  double x[kStates];
-  for (int j = 0; j <= last; ++j) x[j] = g[j];
+  Pair x[kStates / 2] = {};
+  for (int j = 0; j <= last; ++j) x[j / 2][j % 2] = g[j];
   for (int j = last; j >= 0 && w > 0.0; --j) {
-    const double s = x[j];
+    const double s = x[j / 2][j % 2];
     if (s == 0.0) continue;
     const double d = d_[j] + w * s * s;
     const double share = w * s / d;
     w *= d_[j] / d;
     d_[j] = d;
-    for (int i = 0; i < j; ++i) {
-      x[i] -= s * u(i, j);
-      set(i, j, u(i, j) + share * x[i]);
+    x[j / 2][j % 2] = 0.0;  // done with, and zero in the odd column's last pair
+    Pair* column = upper_ + offset(j);
+    for (int p = 0; p < pairs(j); ++p) {
+      x[p] -= s * column[p];
+      column[p] += share * x[p];
     }
   }
 }
