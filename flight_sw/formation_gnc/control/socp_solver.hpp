@@ -19,9 +19,9 @@
 /// Accuracy    Relative residuals and duality gap below `tolerance`, of the equilibrated problem.
 ///             Columns of [A; G] should be independent; rows of A that depend on others are
 ///             tolerated where they are consistent.
-/// Memory      1.4 kB per impulse of such a plan; all of it is released on return, but the solution.
-/// Errors      No exceptions of its own; std::bad_alloc where memory is short.
-/// Checked by  test_suites/unit/flight_sw/formation_gnc/socp_solver_test.cpp
+/// Memory      1.4 kB per impulse of such a plan; all of it is released on return, but the
+/// solution. Errors      No exceptions of its own; std::bad_alloc where memory is short. Checked by
+/// test_suites/unit/flight_sw/formation_gnc/socp_solver_test.cpp
 #pragma once
 
 #include <Eigen/Core>
