@@ -1,11 +1,15 @@
-/// Tables as CSV files: one header line, LF, shortest numbers that read back the same.
+/// Tables as CSV files: one header line, LF, shortest numbers that read back the same, or with a
+/// fixed count of decimals.
 #pragma once
 
 #include <orrery/harness/kernel/time.hpp>
 #include <orrery/harness/record/output_file.hpp>
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <initializer_list>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -26,6 +30,8 @@ class CsvWriter {
 
   /// @throws std::logic_error  more fields than columns.
   CsvWriter& number(double value);
+  /// Some fields with 0 to 17 decimals: where a table need not be finer, shorter and faster.
+  CsvWriter& fixed(std::initializer_list<double> values, int decimals);
   CsvWriter& integer(std::int64_t value);
   CsvWriter& integer(std::uint64_t value);
   CsvWriter& time(SimTime t) { return integer(to_ns(t)); }
@@ -36,17 +42,28 @@ class CsvWriter {
 
   /// @throws std::logic_error  within a row. std::runtime_error  the rest cannot be written.
   void close();
+  /// From here on `sink` gets what goes into the fields, for a digest: of numbers all 64 bits (any
+  /// NaN as 0x7ff8000000000000), of texts the length in 64 bits and the characters.
+  void give_values_to(std::function<void(Bytes)> sink) { sink_ = std::move(sink); }
+
   /// As of OutputFile.
   void flush() { file_.flush(); }
   void continue_in(std::filesystem::path path) { file_.continue_in(std::move(path)); }
 
  private:
-  void begin_field();
+  char* begin_fields(std::size_t count);
+  void end_field(const char* end);
+  char* room(std::size_t bytes);
+  void add_value(std::uint64_t value);
+  void hand_over_values();
 
   OutputFile file_;
-  std::string row_;
+  std::string row_;  // as long as the longest so far; its text ends at end_
+  std::size_t end_ = 0;
   std::size_t columns_;
   std::size_t fields_ = 0;
+  std::function<void(Bytes)> sink_;
+  std::vector<std::uint64_t> values_;  // for the sink
 };
 
 }  // namespace orrery

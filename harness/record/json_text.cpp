@@ -1,6 +1,7 @@
 #include <orrery/harness/record/json_text.hpp>
 #include <orrery/harness/record/number_format.hpp>
 
+#include <algorithm>
 #include <cmath>
 
 namespace orrery {
@@ -27,6 +28,14 @@ std::size_t sequence_bytes(std::string_view text, std::size_t at) {
   return continues(text, at + 3) ? 4 : 0;
 }
 
+// How many characters of the text's begin stand for themselves: most texts have no others.
+std::size_t plain_bytes(std::string_view text) {
+  const auto special = [](unsigned char c) {
+    return c < ' ' || c >= 0x7f || c == '"' || c == '\\' || c == '<';
+  };
+  return static_cast<std::size_t>(std::find_if(text.begin(), text.end(), special) - text.begin());
+}
+
 void append_escaped(std::string& out, char c) {
   constexpr std::string_view kHex = "0123456789abcdef";
   if (c == '"' || c == '\\') {
@@ -46,6 +55,10 @@ void append_escaped(std::string& out, char c) {
 void append_json_text(std::string& out, std::string_view text) {
   out += '"';
   for (std::size_t i = 0; i < text.size();) {
+    const std::size_t plain = plain_bytes(text.substr(i));
+    out += text.substr(i, plain);
+    i += plain;
+    if (i == text.size()) break;
     const std::size_t bytes = sequence_bytes(text, i);
     if (bytes == 1) {
       append_escaped(out, text[i]);

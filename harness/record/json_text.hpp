@@ -24,6 +24,8 @@ class JsonObject {
   JsonObject& add(std::string_view name, double value);
   JsonObject& add(std::string_view name, std::uint64_t value);
   bool empty() const { return members_.empty(); }
+  /// Its members without the braces.
+  const std::string& members() const { return members_; }
   std::string text() const { return "{" + members_ + "}"; }
 
  private:

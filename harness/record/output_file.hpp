@@ -5,7 +5,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <string>
 #include <string_view>
 
@@ -18,7 +17,6 @@ class OutputFile {
   explicit OutputFile(std::filesystem::path path);
   /// Writes what is buffered, silently if that fails: close() first to know.
   ~OutputFile();
-  OutputFile(OutputFile&&) = default;
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
@@ -45,10 +43,11 @@ class OutputFile {
 
  private:
   void require_open() const;
+  void write_at_end(std::string_view text);
   [[noreturn]] void fail(const char* what) const;
 
   std::filesystem::path path_;
-  std::ofstream file_;
+  int file_ = -1;  // descriptor; -1: closed
   std::string buffer_;
   std::uint64_t size_ = 0;
 };

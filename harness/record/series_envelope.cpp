@@ -26,12 +26,19 @@ SeriesEnvelope::SeriesEnvelope(std::size_t most) : most_(most) {
 void SeriesEnvelope::add(Duration t, double value) {
   if (std::isnan(value)) return;
   const Span sample{t, t, value, value, value};
-  if (!spans_.empty() && spans_.back().begin / length_ == t / length_) {
+  if (!spans_.empty() && t < cell_end_) {
     absorb(spans_.back(), sample);
     return;
   }
   spans_.push_back(sample);
   while (spans_.size() > most_) halve();
+  find_cell_end();
+}
+
+// Of times with the same quotient, rounded towards zero.
+void SeriesEnvelope::find_cell_end() {
+  const auto cell = spans_.back().begin / length_;
+  cell_end_ = cell >= 0 ? (cell + 1) * length_ : cell * length_ + Duration{1};
 }
 
 // Twice the length; spans that now fall together become one.

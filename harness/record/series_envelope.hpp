@@ -35,9 +35,11 @@ class SeriesEnvelope {
 
  private:
   void halve();
+  void find_cell_end();
 
   std::size_t most_ = 1500;
   Duration length_{1};
+  Duration cell_end_{};  // of the last span: what is before falls into it
   std::vector<Span> spans_;
 };
 

@@ -176,7 +176,11 @@ void TraceWriter::append_ts(SimTime t) {
 }
 
 void TraceWriter::end_event(const JsonObject& args) {
-  if (!args.empty()) line_ += ",\"args\":" + args.text();
+  if (!args.empty()) {
+    line_ += ",\"args\":{";
+    line_ += args.members();
+    line_ += '}';
+  }
   line_ += '}';
   file_.write(line_);
   line_.clear();

@@ -1,6 +1,7 @@
 // What recording costs: 20 h of two spacecraft that fly formation_keeping, truth at 1 Hz and all
 // files, against the same run with --orrery_record=off in effect. The two alternate, so that a
 // machine that others use slows both.
+#include <orrery/fixtures/recorder.hpp>
 #include <orrery/orrery.hpp>
 
 #include <benchmark/benchmark.h>
@@ -58,6 +59,31 @@ void BM_RecordingAtOneHertz(benchmark::State& state) {
   state.counters["on_s"] = on_s / runs;
   state.counters["cost_percent"] = 100 * (on_s / off_s - 1);
 }
+
+// What a recorder costs that does not record: the calls that a frame over the crosslink and the
+// call of flight software that it causes make of it, eight.
+void BM_RecorderOff(benchmark::State& state) {
+  Recorder recorder;
+  const std::string craft = "deputy", process = "gnc";
+  const ByteBuffer bytes(96);
+  const CallSpan span{};
+  const CallRecord call{};
+  SimTime t = missions::reference_epoch();
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(recorder);
+    recorder.link(craft, t, t, bytes.size(), "delivered");
+    recorder.device_bytes(t, craft, "crosslink", "crosslink", bytes);
+    recorder.span(craft, process, span);
+    recorder.call(craft, process, call);
+    recorder.state(t, craft, process);
+    recorder.burn(t, craft, "thruster", true);
+    recorder.off(t, craft, process);
+    recorder.log(t, craft, process, 0, process);
+    t += 1s;
+  }
+}
+BENCHMARK(BM_RecorderOff);
+
 #ifdef __SANITIZE_ADDRESS__
 constexpr int kHours = 1;
 #else

@@ -35,6 +35,34 @@ TEST_F(CsvWriterTest, AwkwardTextIsQuoted) {
   EXPECT_EQ(content_of(path), "text\n\"a,b\"\n\"say \"\"no\"\"\"\n\"two\nlines\"\n");
 }
 
+TEST_F(CsvWriterTest, FixedNumbersFillSomeFieldsEach) {
+  CsvWriter csv(path, {"x_m", "y_m", "n", "w"});
+  csv.fixed({-6.9e6, 1.0 / 3}, 6).integer(std::int64_t{1}).fixed({0.7071067811865476}, 9).end_row();
+  csv.fixed({std::numeric_limits<double>::quiet_NaN(), 2}, 1).number(0).fixed({1}, 0).end_row();
+  EXPECT_THROW(csv.fixed({1, 2, 3, 4, 5}, 1), std::logic_error);
+  csv.close();
+  EXPECT_EQ(content_of(path), "x_m,y_m,n,w\n-6900000.000000,0.333333,1,0.707106781\nnan,2.0,0,1\n");
+}
+
+// In the order of the fields, whole however the text rounds.
+TEST_F(CsvWriterTest, TheSinkGetsAllBitsOfTheValues) {
+  std::string got;
+  CsvWriter csv(path, {"x", "n", "what"});
+  csv.give_values_to([&got](Bytes values) {
+    got.append(reinterpret_cast<const char*>(values.data()), values.size());
+  });
+  csv.fixed({1.0 / 3}, 2).integer(std::uint64_t{7}).text("a,b").end_row();
+  csv.number(-std::numeric_limits<double>::quiet_NaN()).integer(std::int64_t{-1}).empty().end_row();
+  csv.close();
+  const auto word = [](std::uint64_t value) {
+    std::string bytes(8, '\0');
+    for (std::size_t i = 0; i < 8; ++i) bytes[i] = static_cast<char>(value >> (8 * i));
+    return bytes;
+  };
+  EXPECT_EQ(got, word(0x3FD5555555555555) + word(7) + word(3) + "a,b" + word(0x7ff8000000000000) +
+                     word(~std::uint64_t{0}) + word(0));
+}
+
 TEST_F(CsvWriterTest, WhatWasWrittenIsThereWithoutClose) {
   { CsvWriter csv(path, {"a"}); }
   EXPECT_EQ(content_of(path), "a\n");
