@@ -1,4 +1,5 @@
 #include <orrery/harness/record/channel.hpp>
+#include <orrery/harness/record/channel_table.hpp>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -115,6 +116,25 @@ TEST(ChannelTest, AnotherKindIsRefusedByName) {
                   "\"dsc/mode\" records states; it was given or asked for a number")));
   EXPECT_THROW(mode.along(0), std::logic_error);
   EXPECT_THROW(Channel("a/x_m").only("SAFE"), std::logic_error);
+}
+
+// Whatever a test calls a channel, its file stays in its folder.
+TEST(ChannelTableTest, FileNamesHavePlainCharacters) {
+  EXPECT_EQ(file_name_of("dsc/sun_sensor/angle_rad"), "dsc.sun_sensor.angle_rad");
+  EXPECT_EQ(file_name_of("../../etc/x"), "_......etc.x");
+  EXPECT_EQ(file_name_of("a b\n\xC3\xA9"), "a_b___");
+  EXPECT_EQ(file_name_of(""), "_");
+  EXPECT_EQ(file_name_of(std::string(500, 'x')).size(), 200u);
+}
+
+TEST(ChannelTableTest, ColumnsNameAxisAndUnit) {
+  using testing::ElementsAre;
+  EXPECT_THAT(columns_of(Channel("a/b/angle_rad")), ElementsAre("t_GPS_ns", "angle_rad"));
+  EXPECT_THAT(columns_of(Channel("a/v_ECI_mps", ChannelKind::kVector)),
+              ElementsAre("t_GPS_ns", "v_ECI_x_mps", "v_ECI_y_mps", "v_ECI_z_mps"));
+  EXPECT_THAT(columns_of(Channel("a/wind", ChannelKind::kVector)),
+              ElementsAre("t_GPS_ns", "wind_x", "wind_y", "wind_z"));
+  EXPECT_THAT(columns_of(Channel("mode", ChannelKind::kState)), ElementsAre("t_GPS_ns", "mode"));
 }
 
 }  // namespace
