@@ -37,6 +37,12 @@ struct CallArguments {
   std::int32_t status = ORRERY_OK;  // result
 };
 
+inline HeapOptions heap_options(const FlightProcessOptions& options) {
+  return {.alignment = options.heap_alignment,
+          .limit_bytes = options.heap_bytes,
+          .rules = options.heap};
+}
+
 }  // namespace internal
 
 class FlightProcess::Impl {
