@@ -4,7 +4,11 @@ namespace orrery {
 
 FlightComputer::FlightComputer(EventLoop& loop, OwnerId owner, FlightProcessOptions options,
                                Hooks hooks)
-    : impl_(std::make_unique<Impl>(loop, owner, std::move(options), std::move(hooks))) {}
+    : own_processor_(std::make_unique<Processor>(loop, owner)),
+      impl_(std::make_unique<Impl>(*own_processor_, owner, std::move(options), std::move(hooks))) {}
+FlightComputer::FlightComputer(Processor& processor, OwnerId owner, FlightProcessOptions options,
+                               Hooks hooks)
+    : impl_(std::make_unique<Impl>(processor, owner, std::move(options), std::move(hooks))) {}
 FlightComputer::~FlightComputer() = default;
 
 void FlightComputer::boot() {
@@ -15,9 +19,6 @@ void FlightComputer::reboot(SimTime t, Duration boot_delay, ResetCause cause) {
 }
 void FlightComputer::power_cycle(SimTime t, Duration boot_delay) {
   impl_->reset(t, internal::kPowerCycle, ResetCause::kPowerOn, boot_delay);
-}
-void FlightComputer::jump_clock(SimTime t, Duration by) {
-  impl_->jump_clock(t, by);
 }
 void FlightComputer::kill(SimTime t) {
   impl_->reset(t, internal::kKill, ResetCause::kCommanded, Duration{1});
@@ -93,8 +94,8 @@ NonVolatileMemory& FlightComputer::memory() {
 std::int64_t FlightComputer::onboard_ns() const {
   return impl_->onboard_ns();
 }
-OnboardClock& FlightComputer::clock() {
-  return impl_->clock;
+Processor& FlightComputer::processor() {
+  return impl_->processor;
 }
 void FlightComputer::run(const std::function<void()>& function) {
   impl_->run(function);

@@ -3,7 +3,7 @@
 
 #include <orrery/harness/flight/call_figures.hpp>
 #include <orrery/harness/flight/flight_process.hpp>
-#include <orrery/harness/flight/onboard_clock.hpp>
+#include <orrery/harness/flight/processor.hpp>
 #include <orrery/harness/kernel/event_loop.hpp>
 
 #include <cstdint>
@@ -22,13 +22,14 @@ struct CallSpan {
   CallOutcome outcome = CallOutcome::kDone;
 };
 
-/// One processor with one process.
+/// A flight process on a processor: of its own, or one that several share (processor.hpp).
 ///
 /// Calls    An input is an event of Phase::kDelivery, the tick one of Phase::kTick. A call starts
 ///          when the processor is free and runs at once on the host; its outputs leave at start +
 ///          execution time, in order, as events of Phase::kOutput. Clock reads and sleeps of flight
 ///          code lengthen it (HostServices).
-/// Queue    While the processor is busy 64 inputs of 1 MiB together wait; of more the newest is
+/// Queue    While the processor is not to be had 64 inputs of 1 MiB together wait; of more the
+/// newest is
 ///          dropped and counted. The tick waits beside them, and goes first if it was due earlier.
 /// Tick     One pending. A new request replaces it, a negative one withdraws it; one in the past
 ///          fires when the call that asked for it has ended.
@@ -47,19 +48,18 @@ class FlightComputer {
     std::function<void(LogLevel, std::string_view line)> on_log;
     std::function<void(const CrashReport&)> on_crash;
     std::function<void(const CallRecord&)> on_call;
-    std::function<void(const CallSpan&)> on_span;         // before on_call; not of `destroy`
-    std::function<void()> on_end;                         // a life of the process is over
-    std::function<void(std::string_view port)> on_drop;   // an input, as the queue was full
-    std::function<double(std::uint64_t call)> slow_down;  // factor on the execution time; calls
-                                                          // count from 1
-    std::function<void()> on_power_cycle;                 // devices start cold
+    std::function<void(const CallSpan&)> on_span;        // before on_call; not of `destroy`
+    std::function<void()> on_end;                        // a life of the process is over
+    std::function<void(std::string_view port)> on_drop;  // an input, as the queue was full
+    std::function<void()> on_power_cycle;                // devices start cold
   };
 
-  /// Loads the library. The loop must outlive the computer.
+  /// Loads the library. The loop, or the processor, must outlive the computer.
   /// @throws std::invalid_argument  as FlightProcess, and for execution times and jitters of
   ///                                ports that do not exist, or of counted work in a library that
   ///                                counts none.
   FlightComputer(EventLoop& loop, OwnerId owner, FlightProcessOptions options, Hooks hooks);
+  FlightComputer(Processor& processor, OwnerId owner, FlightProcessOptions options, Hooks hooks);
   ~FlightComputer();
   FlightComputer(const FlightComputer&) = delete;
   FlightComputer& operator=(const FlightComputer&) = delete;
@@ -76,9 +76,6 @@ class FlightComputer {
   void power_cycle(SimTime t, Duration boot_delay);
   /// As reboot(), but it stays off.
   void kill(SimTime t);
-  /// From `t` on, before anything else at that instant, the onboard clock is off by that much more.
-  /// The pending tick moves to where the clock will show its time; one in the past fires at once.
-  void jump_clock(SimTime t, Duration by);
   /// Orderly end, now; waiting inputs and the tick are dropped. Nothing if not alive.
   void shut_down();
 
@@ -116,7 +113,7 @@ class FlightComputer {
   /// Of all its lives.
   NonVolatileMemory& memory();
   std::int64_t onboard_ns() const;  // what the spacecraft's clock shows now
-  OnboardClock& clock();
+  Processor& processor();
   /// Runs a function as flight code of this process, now: FlightProcess::run. Its outputs leave
   /// when the processor is free. @throws std::logic_error  it is not running.
   void run(const std::function<void()>& function);
@@ -126,6 +123,7 @@ class FlightComputer {
 
  private:
   class Impl;
+  std::unique_ptr<Processor> own_processor_;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -17,20 +17,25 @@ constexpr int kMostTicksAtOneInstant = 10'000;
 
 }  // namespace
 
-FlightComputer::Impl::Impl(EventLoop& loop, OwnerId owner, FlightProcessOptions flight_options,
-                           Hooks hooks)
-    : options(std::move(flight_options)),
+FlightComputer::Impl::Impl(Processor& shared_processor, OwnerId owner,
+                           FlightProcessOptions flight_options, Hooks hooks)
+    : processor(shared_processor),
+      options(std::move(flight_options)),
       process(std::make_unique<FlightProcess>(options)),
       memory(process->memory()),
       ports(process->ports()),
-      history(loop.now()),
-      loop_(loop),
+      history(processor.loop().now()),
+      loop_(processor.loop()),
       owner_(owner),
       hooks_(std::move(hooks)),
-      timings_(options, ports, process->counts_work()),
-      busy_until_(loop.now()) {
+      timings_(options, ports, process->counts_work()) {
+  processor.join(*this);
   dropped.resize(ports.size(), 0);
   waiting_.reserve(kMostWaiting);
+}
+
+FlightComputer::Impl::~Impl() {
+  processor.leave(*this);
 }
 
 // ---- events
@@ -58,7 +63,7 @@ void FlightComputer::Impl::on_input(std::uint32_t port, std::uint32_t payload) {
   if (!alive()) {
     ++inputs_lost;
     payloads_.give_back(payload);
-  } else if (busy() || others_wait()) {
+  } else if (has_to_wait()) {
     enqueue(port, payload);
   } else {
     run_input(port, payload);
@@ -74,28 +79,32 @@ void FlightComputer::Impl::enqueue(std::uint32_t port, std::uint32_t payload) {
     return;
   }
   waiting_bytes_ += bytes;
-  waiting_.push_back({port, payload, loop_.now()});
-  wake_when_free();
+  waiting_.push_back({port, payload, loop_.now(), processor.next_arrival()});
+  processor.reconsider();
 }
 
-void FlightComputer::Impl::wake_when_free() {
-  if (free_event_ != EventHandle{}) return;
-  free_event_ = loop_.schedule(std::max(busy_until_, loop_.now()),
-                               {Phase::kDelivery, owner_, owner_, &internal::kProcessorFree},
-                               [this] { on_processor_free(); });
+// The one that has been due for longest; at one instant an input before the tick.
+std::optional<Processor::Claim> FlightComputer::Impl::claim() const {
+  using What = Processor::Waiting;
+  if (boot_waits_) return claim_of(What::kBoot, *boot_waits_);
+  if (tick_waits_ && (waiting_.empty() || tick_waits_->due < waiting_.front().due)) {
+    return claim_of(What::kTick, *tick_waits_);
+  }
+  if (waiting_.empty()) return std::nullopt;
+  return claim_of(What::kInput, {waiting_.front().due, waiting_.front().arrival});
 }
 
-// One call, the one that has been due for longest; at one instant an input before the tick.
-void FlightComputer::Impl::on_processor_free() {
-  free_event_ = {};
-  if (!alive() || !others_wait()) return;
-  if (tick_waits_ && (waiting_.empty() || tick_due_ < waiting_.front().arrival)) {
-    run_tick();
-  } else {
-    const Waiting next = waiting_.front();
-    waiting_.erase(waiting_.begin());
-    waiting_bytes_ -= payloads_[next.payload].size();
-    run_input(next.port, next.payload);
+void FlightComputer::Impl::run_claimed() {
+  switch (claim()->what) {
+    case Processor::Waiting::kBoot:
+      return run_boot();
+    case Processor::Waiting::kTick:
+      return run_tick();
+    case Processor::Waiting::kInput:
+      const WaitingInput next = waiting_.front();
+      waiting_.erase(waiting_.begin());
+      waiting_bytes_ -= payloads_[next.payload].size();
+      return run_input(next.port, next.payload);
   }
 }
 
@@ -104,7 +113,7 @@ void FlightComputer::Impl::run_input(std::uint32_t port, std::uint32_t payload) 
   const internal::TakenPayload taken(payloads_, payload);
   if (taken.bytes().size() > p.max_bytes) {
     ++rejected;
-    if (others_wait()) wake_when_free();
+    processor.reconsider();
     warn("a packet of " + std::to_string(taken.bytes().size()) + " bytes is too long for port " +
          p.name + ", which takes " + std::to_string(p.max_bytes));
     return;
@@ -115,17 +124,16 @@ void FlightComputer::Impl::run_input(std::uint32_t port, std::uint32_t payload) 
 
 void FlightComputer::Impl::on_tick() {
   tick_event_ = {};
-  if (busy() || others_wait()) {
-    tick_waits_ = true;
-    tick_due_ = loop_.now();
-    wake_when_free();
+  if (has_to_wait()) {
+    tick_waits_ = {loop_.now(), processor.next_arrival()};
+    processor.reconsider();
   } else {
     run_tick();
   }
 }
 
 void FlightComputer::Impl::run_tick() {
-  tick_waits_ = false;
+  tick_waits_.reset();
   if (!makes_progress()) return;
   end_call(timings_.tick(), "tick", process->tick(loop_.now(), onboard_ns()));
 }
@@ -161,15 +169,13 @@ void FlightComputer::Impl::on_output(std::uint32_t port, std::uint32_t payload,
 void FlightComputer::Impl::end_call(internal::CallTiming& timing, std::string_view what,
                                     CallOutcome outcome) {
   ++calls;
-  Duration time = timing.execution.of_call(timing.execution_draws, process->work());
-  if (hooks_.slow_down) {
-    const double factor = hooks_.slow_down(calls);
-    if (factor != 1) time = from_seconds(to_seconds(time) * factor);
-  }
-  time += process->virtual_time_spent();
+  const Duration time =
+      processor.slowed(timing.execution.of_call(timing.execution_draws, process->work())) +
+      process->virtual_time_spent();
   timing.count(process->last_host_ticks(), time, process->work());
-  busy_until_ = loop_.now() + time;
-  if (hooks_.on_span) hooks_.on_span({what, loop_.now(), busy_until_, outcome});
+  call_ends_ = loop_.now() + time;
+  processor.occupy(*this, time);
+  if (hooks_.on_span) hooks_.on_span({what, loop_.now(), call_ends_, outcome});
   take_over(outcome);
 }
 
@@ -178,7 +184,6 @@ void FlightComputer::Impl::run(const std::function<void()>& function) {
   if (!alive()) {
     throw std::logic_error("FlightComputer::run: " + process_name(options) + " is not running");
   }
-  busy_until_ = std::max(busy_until_, loop_.now());
   take_over(process->run(loop_.now(), onboard_ns(), function));
 }
 
@@ -190,7 +195,7 @@ void FlightComputer::Impl::take_over(CallOutcome outcome) {
     if (outcome == CallOutcome::kRejected) ++rejected;
     release_outputs();
     if (const auto request = process->tick_request()) set_tick(*request);
-    if (others_wait()) wake_when_free();
+    processor.reconsider();
   }
   tell(outcome);
 }
@@ -201,7 +206,7 @@ void FlightComputer::Impl::release_outputs() {
     const std::uint32_t port = static_cast<std::uint32_t>(output.port - process->ports().data());
     const std::uint32_t payload = payloads_.put(output.data);
     const std::uint32_t life = life_;
-    loop_.schedule(busy_until_, {Phase::kOutput, owner_, owner_, &internal::kOutput},
+    loop_.schedule(processor.free_at(), event(Phase::kOutput, internal::kOutput),
                    [this, port, payload, life] { on_output(port, payload, life); });
   }
 }
@@ -215,28 +220,22 @@ void FlightComputer::Impl::set_tick(std::int64_t onboard_ns) {
     return;
   }
   tick_onboard_ns_ = onboard_ns;
-  const SimTime due = clock.truth(onboard_ns);
-  const SimTime soonest = std::max(busy_until_, loop_.now());
-  tick_event_ =
-      loop_.schedule(timings_.tick().with_jitter(due <= loop_.now() ? soonest : due),
-                     {Phase::kTick, owner_, owner_, &internal::kTick}, [this] { on_tick(); });
+  const SimTime due = processor.clock().truth(onboard_ns);
+  const SimTime soonest = std::max(call_ends_, loop_.now());
+  tick_event_ = loop_.schedule(timings_.tick().with_jitter(due <= loop_.now() ? soonest : due),
+                               event(Phase::kTick, internal::kTick), [this] { on_tick(); });
 }
 
-void FlightComputer::Impl::jump_clock(SimTime t, Duration by) {
-  loop_.schedule(t, {Phase::kFault, owner_, owner_, &internal::kClockJump},
-                 [this, by] { on_clock_jump(by); });
-}
-
-void FlightComputer::Impl::on_clock_jump(Duration by) {
-  clock.set_offset(clock.offset() + by);
+void FlightComputer::Impl::clock_jumped() {
   if (loop_.pending(tick_event_)) set_tick(tick_onboard_ns_);
 }
 
 void FlightComputer::Impl::withdraw_tick() {
   loop_.cancel(tick_event_);
   tick_event_ = {};
-  tick_waits_ = false;
+  tick_waits_.reset();
 }
+
 void FlightComputer::Impl::tell(CallOutcome outcome) {
   if (hooks_.on_log) {
     for (std::size_t i = 0; i < process->log_count(); ++i) {

@@ -5,10 +5,12 @@
 #include <orrery/harness/flight/flight_computer.hpp>
 #include <orrery/harness/flight/payload_pool.hpp>
 #include <orrery/harness/flight/port_table.hpp>
+#include <orrery/harness/flight/processor.hpp>
 
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -20,39 +22,39 @@ inline constexpr EventKind kBoot{100, "flight boot"};
 inline constexpr EventKind kInput{101, "flight input"};
 inline constexpr EventKind kTick{102, "flight tick"};
 inline constexpr EventKind kOutput{103, "flight output"};
-inline constexpr EventKind kProcessorFree{104, "processor free"};
 inline constexpr EventKind kReboot{105, "flight reboot"};
 inline constexpr EventKind kPowerCycle{106, "flight power cycle"};
 inline constexpr EventKind kKill{107, "flight kill"};
 inline constexpr EventKind kBootLoop{108, "boot_loop"};
-inline constexpr EventKind kClockJump{120, "clock jump"};
 
 }  // namespace internal
 
-class FlightComputer::Impl {
+class FlightComputer::Impl final : Processor::User {
  public:
-  Impl(EventLoop& loop, OwnerId owner, FlightProcessOptions options, Hooks hooks);
+  Impl(Processor& processor, OwnerId owner, FlightProcessOptions options, Hooks hooks);
+  ~Impl();
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
 
   void boot();
-  void jump_clock(SimTime t, Duration by);
   void reset(SimTime t, const EventKind& kind, ResetCause cause, Duration boot_delay);
   void shut_down();
   void deliver(std::string_view port, Bytes bytes, OwnerId origin);
   std::uint32_t find_port(std::string_view name, PortDirection direction) const {
     return internal::find_port(ports, name, direction);
   }
-  std::int64_t onboard_ns() const { return clock.onboard_ns(loop_.now()); }
+  std::int64_t onboard_ns() const { return processor.clock().onboard_ns(loop_.now()); }
   bool alive() const { return process != nullptr && process->alive(); }
   HeapFigures heap() const;
   void run(const std::function<void()>& function);
   std::vector<CallFigures> call_figures() const { return timings_.figures(ports, stopwatch_); }
   Duration host_time() const;
 
+  Processor& processor;
   FlightProcessOptions options;
   std::unique_ptr<FlightProcess> process;
   std::shared_ptr<NonVolatileMemory> memory;  // of all its lives
   std::vector<FlightPort> ports;
-  OnboardClock clock;
   HeapHistory history;
   std::uint64_t crashes = 0, boots = 0, calls = 0, rejected = 0, inputs_lost = 0,
                 outputs_discarded = 0;
@@ -60,10 +62,19 @@ class FlightComputer::Impl {
   bool boot_loop = false;
 
  private:
-  struct Waiting {
+  struct WaitingInput {
     std::uint32_t port, payload;
-    SimTime arrival;
+    SimTime due;
+    std::uint64_t arrival;
   };
+  struct WaitingCall {
+    SimTime due;
+    std::uint64_t arrival;
+  };
+
+  std::optional<Processor::Claim> claim() const override;
+  void run_claimed() override;
+  void clock_jumped() override;
 
   void on_input(std::uint32_t port, std::uint32_t payload);
   void on_tick();
@@ -71,24 +82,30 @@ class FlightComputer::Impl {
   void end_call(internal::CallTiming& timing, std::string_view what, CallOutcome outcome);
 
   void on_boot(ResetCause cause);
+  void run_boot();
   void on_reset(const EventKind& kind, ResetCause cause, Duration boot_delay);
   void on_boot_loop();
   void schedule_boot(SimTime t, ResetCause cause);
+  void withdraw_boot();
   bool boots_too_often();
   void load_afresh();
   void end_life();
-  void on_processor_free();
 
-  bool busy() const { return loop_.now() < busy_until_; }
-  bool others_wait() const { return !waiting_.empty() || tick_waits_; }
+  EventSpec event(Phase phase, const EventKind& kind) const {
+    return {phase, owner_, processor.owner(), &kind};
+  }
+  bool has_to_wait() const {
+    return processor.shared() || processor.busy() || !waiting_.empty() || tick_waits_;
+  }
+  Processor::Claim claim_of(Processor::Waiting what, const WaitingCall& call) const {
+    return {-std::int64_t{options.priority}, call.due, what, call.arrival};
+  }
   void enqueue(std::uint32_t port, std::uint32_t payload);
-  void wake_when_free();
   void run_input(std::uint32_t port, std::uint32_t payload);
   void run_tick();
   void take_over(CallOutcome outcome);
   void release_outputs();
   void set_tick(std::int64_t onboard_ns);
-  void on_clock_jump(Duration by);
   void withdraw_tick();
   bool makes_progress();
   void bury();
@@ -110,16 +127,16 @@ class FlightComputer::Impl {
 
   bool booted_ = false;  // or about to be
   EventHandle boot_event_;
+  ResetCause boot_cause_ = ResetCause::kPowerOn;
+  std::optional<WaitingCall> boot_waits_;  // it was due while others had the processor
   std::vector<SimTime> recent_boots_;
-  SimTime busy_until_;
-  std::vector<Waiting> waiting_;  // in order of arrival
+  std::vector<WaitingInput> waiting_;  // in order of arrival
   std::uint64_t waiting_bytes_ = 0;
-  EventHandle free_event_;  // pending while something waits
 
   EventHandle tick_event_;
-  std::int64_t tick_onboard_ns_ = 0;  // asked for, of the pending one
-  bool tick_waits_ = false;           // it was due while the processor was busy
-  SimTime tick_due_;
+  std::int64_t tick_onboard_ns_ = 0;       // asked for, of the pending one
+  std::optional<WaitingCall> tick_waits_;  // it was due while the processor was busy
+  SimTime call_ends_;
   bool warned_of_tick_ = false;
   SimTime last_tick_;
   int ticks_here_ = 0;

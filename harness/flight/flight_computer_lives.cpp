@@ -22,22 +22,30 @@ void FlightComputer::Impl::boot() {
 }
 
 void FlightComputer::Impl::schedule_boot(SimTime t, ResetCause cause) {
-  boot_event_ = loop_.schedule(t, {Phase::kFault, owner_, owner_, &internal::kBoot},
-                               [this, cause] { on_boot(cause); });
+  boot_event_ =
+      loop_.schedule(t, event(Phase::kFault, internal::kBoot), [this, cause] { on_boot(cause); });
 }
 
 void FlightComputer::Impl::on_boot(ResetCause cause) {
   boot_event_ = {};
   if (boots_too_often()) {
     boot_loop = true;
-    loop_.schedule(loop_.now(), {Phase::kFault, owner_, owner_, &internal::kBootLoop},
+    loop_.schedule(loop_.now(), event(Phase::kFault, internal::kBootLoop),
                    [this] { on_boot_loop(); });
     return;
   }
+  boot_cause_ = cause;
+  if (!processor.shared()) return run_boot();
+  boot_waits_ = {loop_.now(), processor.next_arrival()};
+  processor.reconsider();
+}
+
+void FlightComputer::Impl::run_boot() {
+  boot_waits_.reset();
   if (boots > 0) load_afresh();
   const auto boot_count = static_cast<std::uint32_t>(boots++);
   end_call(timings_.create(), "create",
-           process->create(loop_.now(), onboard_ns(), boot_count, cause));
+           process->create(loop_.now(), onboard_ns(), boot_count, boot_cause_));
 }
 
 void FlightComputer::Impl::on_boot_loop() {
@@ -83,7 +91,7 @@ void FlightComputer::Impl::reset(SimTime t, const EventKind& kind, ResetCause ca
     throw std::logic_error("FlightComputer: " + process_name(options) +
                            " is to be reset, or killed, before it has booted");
   }
-  loop_.schedule(t, {Phase::kFault, owner_, owner_, &kind},
+  loop_.schedule(t, event(Phase::kFault, kind),
                  [this, &kind, cause, boot_delay] { on_reset(kind, cause, boot_delay); });
 }
 
@@ -92,13 +100,14 @@ void FlightComputer::Impl::on_reset(const EventKind& kind, ResetCause cause, Dur
     process->cut_off();
     end_life();
   }
-  loop_.cancel(boot_event_);
-  boot_event_ = {};
+  withdraw_boot();
   boot_loop = false;
   if (&kind != &internal::kKill) schedule_boot(loop_.now() + boot_delay, cause);
   if (&kind == &internal::kPowerCycle) {
     memory->files.lose_power();
-    if (!options.clock_keeps_power) clock.set_offset(-Duration(to_ns(loop_.now())));
+    if (!options.clock_keeps_power) {
+      processor.clock().set_offset(-Duration(to_ns(loop_.now())));
+    }
     if (hooks_.on_power_cycle) hooks_.on_power_cycle();
   }
 }
@@ -109,7 +118,8 @@ void FlightComputer::Impl::bury() {
 }
 
 void FlightComputer::Impl::end_life() {
-  busy_until_ = loop_.now();
+  call_ends_ = loop_.now();
+  processor.release(*this);
   ++life_;
   died_ = loop_.now();
   lose_what_waits();
@@ -118,16 +128,23 @@ void FlightComputer::Impl::end_life() {
 
 void FlightComputer::Impl::lose_what_waits() {
   withdraw_tick();
-  loop_.cancel(free_event_);
-  free_event_ = {};
   inputs_lost += waiting_.size();
-  for (const Waiting& w : waiting_) payloads_.give_back(w.payload);
+  for (const WaitingInput& w : waiting_) payloads_.give_back(w.payload);
   waiting_.clear();
   waiting_bytes_ = 0;
+  processor.reconsider();
+}
+
+void FlightComputer::Impl::withdraw_boot() {
+  loop_.cancel(boot_event_);
+  boot_event_ = {};
+  if (!boot_waits_) return;
+  boot_waits_.reset();
+  processor.reconsider();
 }
 
 void FlightComputer::Impl::shut_down() {
-  loop_.cancel(boot_event_);
+  withdraw_boot();
   if (!alive()) return;
   const CallOutcome outcome = process->shut_down(loop_.now(), onboard_ns());
   if (outcome == CallOutcome::kCrashed) {

@@ -48,6 +48,7 @@ enum class OtherFiles : std::uint8_t {
 struct FlightProcessOptions {
   std::string spacecraft;       // "dsc"; goes into file names, so no '/'
   std::string process = "gnc";  // likewise
+  int priority = 0;             // of several processes on one processor the highest goes first
   std::string library;          // CMake target name; ORRERY_FLIGHT_PATH may redirect it
   std::string config = {};      // content of the library's own format, handed to create
   Isolation isolation = Isolation::kCopy;

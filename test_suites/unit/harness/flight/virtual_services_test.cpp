@@ -189,8 +189,8 @@ class ExecutionTimeTest : public testing::Test {
     hooks.on_output = [this](std::string_view, Bytes) {
       out_.push_back(to_ns(loop_.now() - kStart) / 1000);
     };
-    hooks.slow_down = slow_down;
     computer_ = std::make_unique<FlightComputer>(loop_, spacecraft_, std::move(options), hooks);
+    computer_->processor().set_slow_down(slow_down);
     computer_->boot();
     loop_.run_until(kStart);
   }
