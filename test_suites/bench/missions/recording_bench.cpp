@@ -65,6 +65,7 @@ void BM_RecordingAtOneHertz(benchmark::State& state) {
 void BM_RecorderOff(benchmark::State& state) {
   Recorder recorder;
   const std::string craft = "deputy", process = "gnc";
+  const ProcessLabel label{craft, process, craft};
   const ByteBuffer bytes(96);
   const CallSpan span{};
   const CallRecord call{};
@@ -73,11 +74,11 @@ void BM_RecorderOff(benchmark::State& state) {
     benchmark::DoNotOptimize(recorder);
     recorder.link(craft, t, t, bytes.size(), "delivered");
     recorder.device_bytes(t, craft, "crosslink", "crosslink", bytes);
-    recorder.span(craft, process, span);
-    recorder.call(craft, process, call);
+    recorder.span(label, span);
+    recorder.call(label, call);
     recorder.state(t, craft, process);
     recorder.burn(t, craft, "thruster", true);
-    recorder.off(t, craft, process);
+    recorder.off(t, label);
     recorder.log(t, craft, process, 0, process);
     t += 1s;
   }
