@@ -1,0 +1,243 @@
+/* Serves a flight library over orrery_wire.h: on another processor, or in another process. Plain
+ * C99, dlopen and sockets; nothing of the simulator. One client at a time, each with the library
+ * loaded anew. */
+#define _GNU_SOURCE
+#include <arpa/inet.h>
+#include <dlfcn.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+#include <termios.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "orrery_wire.h"
+
+static const char kUsage[] =
+    "usage: orrery-flight-target LIBRARY.so [HOW] [--once]\n"
+    "Serves the flight library to a simulation (--orrery_target=SPACECRAFT=...).\n"
+    "HOW  --stdio                  standard input and output; the default\n"
+    "     --unix PATH              listens on a Unix socket\n"
+    "     --tcp [ADDRESS:]PORT     listens; ADDRESS is 127.0.0.1 unless given, PORT 0 takes a free "
+    "one\n"
+    "     --serial DEVICE:BAUD     a serial line, raw, 8N1\n"
+    "--once ends after the first client. The port that it listens on is printed to standard "
+    "error.\n";
+
+typedef struct connection {
+  int in, out;
+  struct timespec begin;
+} connection;
+
+static void fail(const char* what, const char* about) {
+  fprintf(stderr, "orrery-flight-target: %s: %s\n", what, about);
+  exit(2);
+}
+
+static int32_t read_all(void* context, void* buffer, uint32_t bytes) {
+  const connection* c = context;
+  char* at = buffer;
+  while (bytes > 0) {
+    const ssize_t n = read(c->in, at, bytes);
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return -1;
+    at += n;
+    bytes -= (uint32_t)n;
+  }
+  return 0;
+}
+
+static int32_t write_all(void* context, const void* data, uint32_t bytes) {
+  const connection* c = context;
+  const char* at = data;
+  while (bytes > 0) {
+    const ssize_t n = write(c->out, at, bytes);
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return -1;
+    at += n;
+    bytes -= (uint32_t)n;
+  }
+  return 0;
+}
+
+static void call_begins(void* context) {
+  connection* c = context;
+  clock_gettime(CLOCK_MONOTONIC, &c->begin);
+}
+
+/* Host time, for reports: what a call costs the mission is modelled by the simulation. */
+static void call_ended(void* context, orrery_wire_cost* cost) {
+  const connection* c = context;
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  cost->unit = ORRERY_WU_NS;
+  cost->cost = (uint64_t)((int64_t)(now.tv_sec - c->begin.tv_sec) * 1000000000 +
+                          (now.tv_nsec - c->begin.tv_nsec));
+}
+
+static int serve(const char* path, int in, int out) {
+  enum { kWork_bytes = 8 << 20 };
+  connection c = {.in = in, .out = out};
+  const orrery_wire_link link = {&c, read_all, write_all, call_begins, call_ended};
+  const orrery_flight* (*entry)(void);
+  const orrery_flight* flight;
+  void* work;
+  int32_t status;
+  void* library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+  if (library == NULL) fail("no flight library", dlerror());
+  *(void**)&entry = dlsym(library, "orrery_flight_entry");
+  if (entry == NULL) fail("no orrery_flight_entry in", path);
+  flight = entry();
+  if (flight->abi_version != ORRERY_ABI_VERSION) fail("another version of the ABI in", path);
+  work = malloc(kWork_bytes);
+  if (work == NULL) fail("no memory for", path);
+  status = orrery_wire_serve(&link, flight, work, kWork_bytes);
+  free(work);
+  /* Not closed: a client that goes away leaves a library that no destroy has ended. */
+  return status == ORRERY_OK ? 0 : 1;
+}
+
+/* What flight code prints must not get between the frames. */
+static int serve_stdio(const char* path) {
+  const int in = dup(STDIN_FILENO), out = dup(STDOUT_FILENO), none = open("/dev/null", O_RDONLY);
+  if (in < 0 || out < 0 || none < 0) fail("standard input or output", strerror(errno));
+  dup2(none, STDIN_FILENO);
+  dup2(STDERR_FILENO, STDOUT_FILENO);
+  return serve(path, in, out);
+}
+
+static speed_t speed_of(const char* baud) {
+  static const struct {
+    const char* name;
+    speed_t speed;
+  } kSpeeds[] = {{"9600", B9600},     {"19200", B19200},   {"38400", B38400},
+                 {"57600", B57600},   {"115200", B115200}, {"230400", B230400},
+                 {"460800", B460800}, {"921600", B921600}, {"1000000", B1000000}};
+  size_t i;
+  for (i = 0; i < sizeof kSpeeds / sizeof kSpeeds[0]; ++i) {
+    if (strcmp(kSpeeds[i].name, baud) == 0) return kSpeeds[i].speed;
+  }
+  fail("the baud rate is one of 9600 19200 38400 57600 115200 230400 460800 921600 1000000, not",
+       baud);
+  return B0;
+}
+
+static int serve_serial(const char* path, char* device) {
+  struct termios line;
+  char* baud = strrchr(device, ':');
+  int fd;
+  if (baud == NULL) fail("--serial takes DEVICE:BAUD, not", device);
+  *baud++ = '\0';
+  fd = open(device, O_RDWR | O_NOCTTY);
+  if (fd < 0 || tcgetattr(fd, &line) != 0) fail(device, strerror(errno));
+  cfmakeraw(&line);
+  line.c_cflag |= CLOCAL | CREAD;
+  line.c_cc[VMIN] = 1;
+  line.c_cc[VTIME] = 0;
+  if (cfsetspeed(&line, speed_of(baud)) != 0 || tcsetattr(fd, TCSAFLUSH, &line) != 0) {
+    fail(device, strerror(errno));
+  }
+  return serve(path, fd, fd);
+}
+
+static int listen_unix(const char* path) {
+  struct sockaddr_un address = {.sun_family = AF_UNIX};
+  const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (strlen(path) >= sizeof address.sun_path) fail("the path of a Unix socket is too long", path);
+  strcpy(address.sun_path, path);
+  unlink(path);
+  if (fd < 0 || bind(fd, (struct sockaddr*)&address, sizeof address) != 0 || listen(fd, 1) != 0) {
+    fail(path, strerror(errno));
+  }
+  return fd;
+}
+
+static int listen_tcp(char* where) {
+  struct sockaddr_in address = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+  socklen_t bytes = sizeof address;
+  char* colon = strrchr(where, ':');
+  char* end = NULL;
+  const char* digits = colon == NULL ? where : colon + 1;
+  const long port = strtol(digits, &end, 10);
+  const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), yes = 1;
+  if (*digits == '\0' || *end != '\0' || port < 0 || port > 65535) {
+    fail("--tcp takes [ADDRESS:]PORT with a port of 0 to 65535, not", where);
+  }
+  if (colon != NULL) {
+    *colon = '\0';
+    if (inet_pton(AF_INET, where, &address.sin_addr) != 1) fail("not an IPv4 address", where);
+  }
+  address.sin_port = htons((uint16_t)port);
+  if (fd >= 0) setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  if (fd < 0 || bind(fd, (struct sockaddr*)&address, bytes) != 0 || listen(fd, 1) != 0 ||
+      getsockname(fd, (struct sockaddr*)&address, &bytes) != 0) {
+    fail("cannot listen", strerror(errno));
+  }
+  fprintf(stderr, "orrery-flight-target: listens on port %d\n", ntohs(address.sin_port));
+  return fd;
+}
+
+/* A process per client: its library starts as it was linked, and a crash ends that process alone.
+ */
+static int serve_listener(const char* path, int listener, int once) {
+  int status = 0;
+  do {
+    const int yes = 1, fd = accept4(listener, NULL, NULL, SOCK_CLOEXEC);
+    pid_t child;
+    if (fd < 0 && errno == EINTR) continue;
+    if (fd < 0) fail("accept", strerror(errno));
+    setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &yes,
+               sizeof yes); /* fails on a Unix socket: no matter */
+    child = fork();
+    if (child < 0) fail("fork", strerror(errno));
+    if (child == 0) {
+      close(listener);
+      exit(serve(path, fd, fd));
+    }
+    close(fd);
+    while (waitpid(child, &status, 0) < 0 && errno == EINTR) continue;
+    if (WIFSIGNALED(status)) {
+      fprintf(stderr, "orrery-flight-target: flight code ended by signal %d (%s)\n",
+              WTERMSIG(status), strsignal(WTERMSIG(status)));
+    }
+  } while (!once);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
+}
+
+int main(int argc, char** argv) {
+  const char *path = NULL, *how = "--stdio";
+  char* where = NULL;
+  int once = 0, i;
+  for (i = 1; i < argc; ++i) {
+    const int takes_where = strcmp(argv[i], "--unix") == 0 || strcmp(argv[i], "--tcp") == 0 ||
+                            strcmp(argv[i], "--serial") == 0;
+    if (strcmp(argv[i], "--once") == 0) {
+      once = 1;
+    } else if (takes_where && i + 1 < argc) {
+      how = argv[i];
+      where = argv[++i];
+    } else if (argv[i][0] != '-' && path == NULL) {
+      path = argv[i];
+    } else if (strcmp(argv[i], "--stdio") != 0) {
+      fputs(kUsage, stderr);
+      return 2;
+    }
+  }
+  if (path == NULL) {
+    fputs(kUsage, stderr);
+    return 2;
+  }
+  signal(SIGPIPE, SIG_IGN);
+  if (where == NULL) return serve_stdio(path);
+  if (strcmp(how, "--serial") == 0) return serve_serial(path, where);
+  return serve_listener(path, strcmp(how, "--unix") == 0 ? listen_unix(where) : listen_tcp(where),
+                        once);
+}
