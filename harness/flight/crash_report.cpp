@@ -51,6 +51,8 @@ const char* to_string(CrashKind kind) {
       return "uncaught exception";
     case CrashKind::kExit:
       return "exit";
+    case CrashKind::kTargetLost:
+      return "lost target";
     case CrashKind::kFatalStatus:
       return "status ORRERY_FATAL";
     case CrashKind::kUnknownStatus:

@@ -24,6 +24,7 @@ enum class CrashKind : std::uint8_t {
   kStackOverflow,  // passed the end of its stack
   kWorkBudget,     // counted more work in one call than it may (COUNT_WORK)
   kForbiddenCall,  // called what flight code must not: a thread, or with HostServices::kStrict
+  kTargetLost,     // runs elsewhere, and the link to there broke, or what came over it was wrong
   kTimeout,        // one call used up its limit of the host's time: no two hosts agree on it
 };
 const char* to_string(CrashKind kind);

@@ -5,6 +5,7 @@
 #include <orrery/harness/flight/flight_port.hpp>
 #include <orrery/harness/heap/heap_options.hpp>
 #include <orrery/harness/kernel/time.hpp>
+#include <orrery/harness/remote/target_address.hpp>
 
 #include <cstdint>
 #include <functional>
@@ -79,6 +80,10 @@ struct FlightProcessOptions {
   HostServices services = HostServices::kVirtual;
   RandomStreams* random = nullptr;            // of the run; null: a set of the process's own
   std::shared_ptr<CallRecording> calls = {};  // gets every call of every life; null: none is kept
+  /// Where the library runs, if not in this program: `library` is then a name only, and what
+  /// concerns its memory here (heap, stack, files, services, isolation) has no effect.
+  TargetAddress target = {};
+  Duration target_patience{30'000'000'000};  // host time for one call there, and to be reached
   bool clock_keeps_power = false;  // false: after a power cycle the clock starts at its zero
 };
 

@@ -58,7 +58,7 @@ CallOutcome FlightProcess::run(SimTime truth, std::int64_t onboard_ns,
                      {});
 }
 void* FlightProcess::symbol(const char* symbol_name) const {
-  return impl_->library->symbol(symbol_name);
+  return impl_->library == nullptr ? nullptr : impl_->library->symbol(symbol_name);
 }
 
 CallOutcome FlightProcess::shut_down(SimTime truth, std::int64_t onboard_ns) {
@@ -111,13 +111,15 @@ bool FlightProcess::counts_work() const {
 }
 
 const std::vector<std::string>& FlightProcess::edited_symbols() const {
-  return impl_->library->edited_symbols();
+  static const std::vector<std::string> kNone;
+  return impl_->library == nullptr ? kNone : impl_->library->edited_symbols();
 }
 const std::string& FlightProcess::written_global() const {
   return impl_->written_global;
 }
 const std::vector<std::string>& FlightProcess::shared_dependencies() const {
-  return impl_->library->shared_dependencies();
+  static const std::vector<std::string> kNone;
+  return impl_->library == nullptr ? kNone : impl_->library->shared_dependencies();
 }
 Duration FlightProcess::host_time_in_flight() const {
   return impl_->stopwatch.total();

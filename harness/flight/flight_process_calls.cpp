@@ -66,8 +66,12 @@ CallOutcome FlightProcess::Impl::call(CallArguments arguments, SimTime truth, By
     stack->overwrite_used(hash_word(options.heap.seed, calls));
   }
   stopwatch.start();
-  const bool returned = internal::run_contained(
-      contained_, [](void* self) { static_cast<Impl*>(self)->run_library_call(); }, this, capture_);
+  const bool returned =
+      target != nullptr
+          ? call_target()
+          : internal::run_contained(
+                contained_, [](void* self) { static_cast<Impl*>(self)->run_library_call(); }, this,
+                capture_);
   stopwatch.stop();
   end_call(truth);
   if (options.calls != nullptr) record_call(data, returned);
@@ -106,6 +110,7 @@ void FlightProcess::Impl::begin_call() {
   logs.clear();
   log_text.clear();
   tick_request.reset();
+  record = CallRecord{};
   if (work != nullptr) {
     work->count = 0;
     work->limit = options.work_budget == 0 ? UINT64_MAX : options.work_budget;
@@ -120,7 +125,7 @@ void FlightProcess::Impl::begin_call() {
 }
 
 void FlightProcess::Impl::end_call(SimTime truth) {
-  record = CallRecord{.t = truth};
+  record.t = truth;
   if (heap != nullptr) {
     const BlockHeap& blocks = heap->blocks();
     record.resting_bytes = blocks.live_bytes();

@@ -22,7 +22,8 @@ const char* call_name(Call call) {
 }  // namespace
 
 void FlightProcess::Impl::die_of_last_call(SimTime truth) {
-  die(capture_.kind, capture_.message, truth, arguments_);
+  const bool lost = capture_.kind == CrashKind::kTargetLost;
+  die(capture_.kind, lost ? target_loss_ : capture_.message, truth, arguments_);
 }
 
 void FlightProcess::Impl::die(CrashKind kind, std::string message, SimTime truth,
@@ -46,7 +47,9 @@ void FlightProcess::Impl::die(CrashKind kind, std::string message, SimTime truth
     crash.input = input_;
   }
   if (work != nullptr) crash.work = work->count;
-  crash.backtrace = internal::stack_frames(capture_, library->loaded_paths());
+  if (library != nullptr) {
+    crash.backtrace = internal::stack_frames(capture_, library->loaded_paths());
+  }
   capture_.frame_count = 0;
   if (kind == CrashKind::kHeapFault) tell_of_block(fault_address_);
   mark_half_initialised();
@@ -81,6 +84,7 @@ void FlightProcess::Impl::cut_off() {
   contained_.exit_functions.clear();
   files.close_all();
   if (heap != nullptr) heap->drop();
+  target.reset();
 }
 
 void FlightProcess::Impl::tell_of_block(const void* address) {

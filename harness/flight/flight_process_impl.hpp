@@ -7,6 +7,7 @@
 #include <orrery/harness/flight/file_services.hpp>
 #include <orrery/harness/flight/flight_library.hpp>
 #include <orrery/harness/flight/flight_process.hpp>
+#include <orrery/harness/flight/flight_target.hpp>
 #include <orrery/harness/flight/globals_watch.hpp>
 #include <orrery/harness/flight/host_stopwatch.hpp>
 #include <orrery/harness/flight/virtual_services.hpp>
@@ -82,6 +83,7 @@ class FlightProcess::Impl {
   std::shared_ptr<NonVolatileMemory> memory;
   internal::FileServices files;
   std::unique_ptr<FlightLibrary> library;  // unloaded while all of the above is still there
+  std::unique_ptr<internal::FlightTarget> target;  // in place of the library
   orrery_work* work = nullptr;             // of the library; null: it counts none
 
   std::vector<internal::GlobalsWatch> globals;    // Isolation::kShared; the library's own first
@@ -112,6 +114,10 @@ class FlightProcess::Impl {
 
  private:
   void load();
+  void reach_target();
+  bool call_target();
+  const TargetAnswer& ask_target();
+  void take_answer(const TargetAnswer& answer);
   void find_work_counter();
   void fill_host_table();
   void begin_call();
@@ -132,6 +138,7 @@ class FlightProcess::Impl {
 
   internal::ContainedProcess contained_;
   internal::CrashCapture capture_;
+  std::string target_loss_;  // what capture_.message has no room for
   orrery_host host_{};
   void* self_ = nullptr;
   internal::CallArguments arguments_;

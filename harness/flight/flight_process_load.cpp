@@ -57,6 +57,10 @@ FlightProcess::Impl::Impl(FlightProcessOptions o, std::shared_ptr<NonVolatileMem
   if (internal::call_in_progress()) {
     throw std::logic_error("FlightProcess: loaded from within a call of flight code");
   }
+  if (options.target.kind != TargetAddress::Kind::kHere) {
+    reach_target();
+    return;
+  }
   if (heap_simulation_available() || heap_accounting_available()) {
     heap = std::make_unique<SimulatedHeap>(internal::heap_options(options));
     heap->blocks().set_fault_handler(on_heap_fault, this);
@@ -135,7 +139,7 @@ void FlightProcess::Impl::watch_globals() {
 FlightProcess::Impl::~Impl() {
   if (!crashed && !ended) shut_down_library();
   // Without our __cxa_atexit the C library keeps the dead process's destructors, and runs them.
-  if (crashed && !heap_simulation_available()) library->keep_loaded();
+  if (crashed && library != nullptr && !heap_simulation_available()) library->keep_loaded();
 }
 
 // What remains of the library after destroy: its static destructors, in reverse order. False: they
@@ -143,6 +147,8 @@ FlightProcess::Impl::~Impl() {
 bool FlightProcess::Impl::shut_down_library() {
   alive = false;
   ended = true;
+  target.reset();
+  if (library == nullptr) return true;
   const bool returned = internal::run_contained(
       contained_,
       [](void* argument) {

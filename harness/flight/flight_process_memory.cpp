@@ -87,6 +87,7 @@ const std::shared_ptr<NonVolatileMemory>& FlightProcess::memory() const {
 
 std::string FlightProcess::flip_bit(FlightMemory memory, double place) {
   impl_->require_between_calls("flip_bit");
+  if (impl_->target != nullptr) return "";
   if (memory == FlightMemory::kGlobals) {
     return internal::flip_global(impl_->library->loaded_path(), impl_->library->base(), place);
   }

@@ -1,0 +1,135 @@
+// Calls of a process that runs on a target: what FlightProcess does with a library of its own, from
+// what came over the wire.
+
+#include <orrery/harness/flight/flight_process_impl.hpp>
+#include <orrery/harness/flight/flight_target.hpp>
+#include <orrery/harness/flight/port_table.hpp>
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace orrery {
+namespace internal {
+
+namespace {
+
+TargetAddress where_it_runs(const FlightProcessOptions& options) {
+  if (options.target.kind != TargetAddress::Kind::kEmulator) return options.target;
+  const std::string processor = "@" + emulated_processor(options.target);
+  return emulator_command(options.target, find_flight_library("orrery-flight-target" + processor),
+                          find_flight_library(options.library + processor));
+}
+
+}  // namespace
+
+FlightTarget::FlightTarget(const FlightProcessOptions& options) {
+  try {
+    remote_.emplace(where_it_runs(options), options.target_patience);
+  } catch (const TargetLost& lost) {
+    throw std::invalid_argument("flight process " + process_name(options) + ": " + lost.what());
+  }
+  const TargetHello& hello = remote_->hello();
+  for (const TargetHello::Port& port : hello.ports) {
+    ports_.push_back({port.id, port.direction, port.kind, port.name.c_str(), port.max_bytes});
+  }
+  table_.size = sizeof table_;
+  table_.abi_version = ORRERY_ABI_VERSION;
+  table_.name = hello.name.c_str();
+  table_.version = hello.version.c_str();
+  table_.ports = ports_.data();
+  table_.port_count = static_cast<std::uint32_t>(ports_.size());
+  // Never called: there, a library has them all.
+  table_.create = [](void**, const orrery_host*, const orrery_boot*) { return ORRERY_FATAL; };
+  table_.input = [](void*, std::int64_t, std::uint32_t, const void*, std::uint32_t) {
+    return ORRERY_FATAL;
+  };
+  table_.tick = [](void*, std::int64_t) { return ORRERY_FATAL; };
+  table_.destroy = [](void*) {};
+}
+
+}  // namespace internal
+
+using Call = internal::LibraryCall;
+
+void FlightProcess::Impl::reach_target() {
+  if (options.adapter) {
+    throw std::invalid_argument("flight process " + name +
+                                ": a FlightAdapter calls a library in this program, so it cannot "
+                                "run on the target " +
+                                to_string(options.target));
+  }
+  target = std::make_unique<internal::FlightTarget>(options);
+  flight = target->flight();
+  try {
+    ports = internal::checked_ports(flight);
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument("flight library \"" + target->remote().hello().name + "\" on " +
+                                to_string(options.target) + ": " + error.what());
+  }
+}
+
+// False: it is lost, and capture_ says how.
+bool FlightProcess::Impl::call_target() {
+  try {
+    take_answer(ask_target());
+    return true;
+  } catch (const TargetLost& lost) {
+    capture_ = internal::CrashCapture{};
+    capture_.kind = CrashKind::kTargetLost;
+    target_loss_ = std::string("the link to its processor broke: ") + lost.what();
+    return false;
+  }
+}
+
+const TargetAnswer& FlightProcess::Impl::ask_target() {
+  RemoteFlight& remote = target->remote();
+  const internal::CallArguments& a = arguments_;
+  switch (a.call) {
+    case Call::kCreate:
+      return remote.create(a.onboard_ns,
+                           {.spacecraft = options.spacecraft,
+                            .process = options.process,
+                            .boot_count = a.boot->boot_count,
+                            .reset_cause = a.boot->reset_cause,
+                            .config = options.config,
+                            .storage_bytes = static_cast<std::uint32_t>(
+                                std::min<std::uint64_t>(options.storage_bytes, UINT32_MAX)),
+                            .slots = &memory->slots()});
+    case Call::kInput:
+      return remote.input(a.onboard_ns, a.port->id, input_);
+    case Call::kTick:
+      return remote.tick(a.onboard_ns);
+    case Call::kDestroy:
+      return remote.destroy(a.onboard_ns);
+    case Call::kLoad:
+    case Call::kRun:
+      break;
+  }
+  throw std::logic_error("FlightProcess::run: " + name + " runs on the target " +
+                         to_string(options.target) + ", where no function of this program does");
+}
+
+void FlightProcess::Impl::take_answer(const TargetAnswer& answer) {
+  arguments_.status = answer.status;
+  for (const TargetAnswer::Message& m : answer.outputs) {
+    outputs.push_back({find_output(m.number), output_bytes.size(), m.bytes});
+    const Bytes message = answer.of(m);
+    output_bytes.insert(output_bytes.end(), message.begin(), message.end());
+  }
+  for (const TargetAnswer::Message& m : answer.logs) {
+    const auto level = static_cast<std::int32_t>(m.number);
+    logs.push_back({static_cast<LogLevel>(std::clamp(level, ORRERY_DEBUG + 0, ORRERY_ERROR + 0)),
+                    log_text.size(), m.bytes});
+    log_text.append(reinterpret_cast<const char*>(answer.of(m).data()), m.bytes);
+  }
+  // A store that fails here (a full or torn medium) is not known there before the next boot.
+  for (const TargetAnswer::Message& m : answer.stores) {
+    const Bytes content = answer.of(m);
+    memory->store(m.number, ByteBuffer(content.begin(), content.end()));
+  }
+  if (answer.asked_for_tick) tick_request = answer.pending_tick_ns;
+  record.resting_bytes = answer.heap_now_bytes;
+  record.transient_peak_bytes = answer.heap_peak_bytes;
+}
+
+}  // namespace orrery

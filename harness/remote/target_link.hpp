@@ -1,0 +1,52 @@
+/// Bytes to and from a target, each wait with an end.
+#pragma once
+
+#include <orrery/harness/kernel/bytes.hpp>
+#include <orrery/harness/kernel/time.hpp>
+#include <orrery/harness/remote/target_address.hpp>
+
+#include <stdexcept>
+#include <string>
+#include <sys/types.h>
+
+namespace orrery {
+
+/// The link to a target broke, or the target sent what it may not: nothing more is to be had of it.
+class TargetLost : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Host time is read to give up only; no result of a run depends on it.
+class TargetLink {
+ public:
+  /// Starts the command, or connects, waiting for the target for at most `patience`.
+  /// @throws TargetLost
+  TargetLink(const TargetAddress& address, Duration patience);
+  /// On a connected stream socket, which it closes.
+  TargetLink(int socket, Duration patience);
+  /// Ends what it started, by SIGKILL to its process group.
+  ~TargetLink();
+  TargetLink(const TargetLink&) = delete;
+  TargetLink& operator=(const TargetLink&) = delete;
+
+  /// All of it. @throws TargetLost  past `patience`, or where the other side is gone
+  void write(Bytes data);
+  void read(std::byte* to, std::size_t bytes);
+  /// From here on read() and write() together take at most `patience`.
+  void begin_exchange();
+
+ private:
+  void wait_for(short events);
+  std::size_t receive(std::byte* to, std::size_t bytes);
+  std::string how_it_ended();
+
+  Duration patience_;
+  std::int64_t deadline_ns_ = 0;
+  int fd_ = -1;
+  pid_t child_ = -1;  // -1: none was started
+  ByteBuffer buffer_;
+  std::size_t begin_ = 0, end_ = 0;  // unread part of the buffer
+};
+
+}  // namespace orrery
