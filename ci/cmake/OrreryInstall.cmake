@@ -32,7 +32,12 @@ install(FILES
   ${PROJECT_BINARY_DIR}/orreryConfig.cmake
   ${PROJECT_BINARY_DIR}/orreryConfigVersion.cmake
   ${CMAKE_CURRENT_LIST_DIR}/OrreryDependencies.cmake
+  ${CMAKE_CURRENT_LIST_DIR}/OrreryCross.cmake
   ${CMAKE_CURRENT_LIST_DIR}/OrreryNumerics.cmake
   ${CMAKE_CURRENT_LIST_DIR}/OrreryUser.cmake
   ${PROJECT_SOURCE_DIR}/flight_sw/abi/orrery_work.cpp
   DESTINATION ${orrery_package_dir})
+install(FILES   # built by users for other processors
+  ${PROJECT_SOURCE_DIR}/flight_sw/abi/orrery_wire.c
+  ${PROJECT_SOURCE_DIR}/flight_sw/host/orrery_flight_target.c
+  DESTINATION ${orrery_package_dir}/target)

@@ -11,4 +11,5 @@ foreach(function IN LISTS orrery_libm_functions)
   list(APPEND orrery_numeric_flags -fno-builtin-${function})
 endforeach()
 # Other languages of a target (assembler, Fortran) do not know these flags.
+set(ORRERY_NUMERIC_FLAG_LIST ${orrery_numeric_flags})
 set(ORRERY_NUMERIC_FLAGS "$<$<COMPILE_LANGUAGE:C,CXX>:${orrery_numeric_flags}>")

@@ -1,18 +1,21 @@
 # What a user calls. The same file serves the build tree, FetchContent and an installed Orrery.
 #
-#   orrery_add_flight_library(<name> SOURCES <file>... [LINK <target>...] [COUNT_WORK])
+#   orrery_add_flight_library(<name> SOURCES <file>... [LINK <target>...] [COUNT_WORK]
+#                             [CROSS armhf|armel|arm64...])
 #   orrery_add_test(<name> SOURCES <file>... FLIGHT <target>... [LINK <target>...]
 #                   [LABELS <label>...] [TIMEOUT <seconds>] [SHARDS <n>])
 include_guard(GLOBAL)
+include(${CMAKE_CURRENT_LIST_DIR}/OrreryCross.cmake)
 
 # A package of flight software as a module that the harness can load, lib<name>.so.
 #
 # It sees orrery::flight_abi and LINK, and of the simulator nothing: including one of its headers is a
 # compile error. Hidden visibility leaves the entry point as the only exported symbol; asserts stay in
 # every build type. With COUNT_WORK it counts the edges of its control flow (orrery_work.h), for work
-# budgets and modelled execution time. The property ORRERY_FLIGHT_LIBRARY of the target is TRUE.
+# budgets and modelled execution time. With CROSS it is built for those processors, too, for
+# --orrery_target=SPACECRAFT=qemu-arm (OrreryCross.cmake). The property ORRERY_FLIGHT_LIBRARY of the target is TRUE.
 function(orrery_add_flight_library name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "COUNT_WORK" "" "SOURCES;LINK")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "COUNT_WORK" "" "SOURCES;LINK;CROSS")
   orrery_check_arguments("orrery_add_flight_library(${name})" SOURCES)
   foreach(target IN LISTS arg_LINK)
     if(target MATCHES "^orrery(::|_)(kernel|models|harness|fixtures|allocator|main)$")
@@ -41,6 +44,7 @@ function(orrery_add_flight_library name)
   endif()
   orrery_refuse_undefined_symbols(${name})
   orrery_use_project_flags(${name})
+  orrery_cross_build(${name} ${arg_CROSS})
 endfunction()
 
 # A GoogleTest program that flies the libraries in FLIGHT: SHARED, MODULE or IMPORTED targets, which
@@ -130,6 +134,12 @@ function(orrery_name_flight_targets name)
     orrery_check_flight_target(${name} ${target})
     add_dependencies(${name} ${target})
     string(APPEND table "    {R\"~(${target})~\", R\"~($<TARGET_FILE:${target}>)~\"},\n")
+    get_target_property(others ${target} ORRERY_CROSS_FILES)
+    foreach(other IN LISTS others)
+      if(other MATCHES "^(.*@.*)=(.*)$")
+        string(APPEND table "    {R\"~(${CMAKE_MATCH_1})~\", R\"~(${CMAKE_MATCH_2})~\"},\n")
+      endif()
+    endforeach()
   endforeach()
   if(NOT table)
     return()

@@ -1,6 +1,7 @@
 #include <orrery/harness/gtest/flags.hpp>
 #include <orrery/harness/gtest/listener.hpp>
 
+#include <algorithm>
 #include <charconv>
 #include <cstdio>
 #include <cstdlib>
@@ -73,6 +74,25 @@ LogSetting parse_log(std::string_view text) {
   refuse("log", text, "debug, info, warning, error or off, then optionally ,SPACECRAFT");
 }
 
+// "dsc=exec:./host lib.so; osc=tcp:10.0.0.5:5000"
+void add_targets(Flags& flags, std::string_view text) {
+  constexpr std::string_view kSeparator = "; ";
+  while (!text.empty()) {
+    const std::string_view one = text.substr(0, text.find(kSeparator));
+    const std::size_t equals = one.find('=');
+    if (equals == 0 || equals == std::string_view::npos) {
+      refuse("target", one, "SPACECRAFT=HOW, as in dsc=tcp:10.0.0.5:5000");
+    }
+    try {
+      flags.targets.push_back(
+          {std::string(one.substr(0, equals)), parse_target_address(one.substr(equals + 1))});
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument("--orrery_target=" + std::string(one) + ": " + error.what());
+    }
+    text.remove_prefix(std::min(text.size(), one.size() + kSeparator.size()));
+  }
+}
+
 bool parse_switch(const std::string& name, std::string_view text) {
   if (text.empty() || text == "1" || text == "true") return true;
   if (text == "0" || text == "false") return false;
@@ -112,6 +132,7 @@ const std::map<std::string, Setter>& setters() {
        [](Flags& f, std::string_view v) {
          f.shuffle_ties = parse_integer("shuffle_ties", v, 0, kSeedEnd - 1);
        }},
+      {"target", add_targets},
       {"progress", [](Flags& f, std::string_view v) { f.progress = parse_switch("progress", v); }},
   };
   return kSetters;

@@ -4,6 +4,7 @@
 
 #include <orrery/harness/kernel/simulator_only.hpp>
 #include <orrery/harness/kernel/time.hpp>
+#include <orrery/harness/remote/target_address.hpp>
 
 #include <cstdint>
 #include <optional>
@@ -35,6 +36,13 @@ struct Flags {
   bool verify_determinism = false;  // --orrery_verify_determinism: run each test twice, compare
   bool shrink = false;              // --orrery_shrink: reduce a failing test's faults, print them
   std::uint64_t shuffle_ties = 0;  // --orrery_shuffle_ties=N: ties in another order, seeded; 0: not
+  /// --orrery_target=SPACECRAFT=HOW, or SPACECRAFT/PROCESS=HOW, once for each; in ORRERY_TARGET
+  /// separated by "; ". HOW as in parse_target_address().
+  struct Target {
+    std::string process;
+    TargetAddress address;
+  };
+  std::vector<Target> targets = {};
   /// --orrery_progress: a line per twentieth of a run, and a result table. Empty: one line that
   /// changes, on a terminal alone; false: never.
   std::optional<bool> progress = {};

@@ -82,6 +82,9 @@ std::string replay_command() {
   if (flags().shuffle_ties != 0) {
     command += " --orrery_shuffle_ties=" + std::to_string(flags().shuffle_ties);
   }
+  for (const Flags::Target& target : flags().targets) {
+    command += " --orrery_target='" + target.process + "=" + to_string(target.address) + "'";
+  }
   if (flags().runs) command += " --orrery_runs=" + std::to_string(*flags().runs);
   return command;
 }

@@ -65,5 +65,23 @@ TEST(FlagsTest, NonsenseIsNamed) {
               ThrowsMessage<std::invalid_argument>(HasSubstr("one thread")));
 }
 
+TEST(FlagsTest, TargetsNameProcessesAndTheWayThere) {
+  const Flags f =
+      parse_flags({"--orrery_target=dsc=qemu-arm", "--orrery_target=osc/gnc=tcp:h:5"}, {});
+  ASSERT_EQ(f.targets.size(), 2u);
+  EXPECT_EQ(f.targets[0].process, "dsc");
+  EXPECT_EQ(to_string(f.targets[0].address), "qemu-arm");
+  EXPECT_EQ(f.targets[1].process, "osc/gnc");
+  EXPECT_EQ(to_string(f.targets[1].address), "tcp:h:5");
+  const Flags e = parse_flags({}, {"ORRERY_TARGET=dsc=exec:a b=c; osc=unix:/x"});
+  ASSERT_EQ(e.targets.size(), 2u);
+  EXPECT_EQ(to_string(e.targets[0].address), "exec:a b=c");
+  EXPECT_EQ(to_string(e.targets[1].address), "unix:/x");
+  for (const char* wrong : {"--orrery_target=dsc", "--orrery_target==qemu-arm",
+                            "--orrery_target=dsc=udp:h:5", "--orrery_target=dsc="}) {
+    EXPECT_THROW(parse_flags({wrong}, {}), std::invalid_argument) << wrong;
+  }
+}
+
 }  // namespace
 }  // namespace orrery
