@@ -178,4 +178,26 @@ void OutputFolder::replace_earlier() {
   fs::rename(partial_, path_);
 }
 
+std::vector<UnfinishedRun> unfinished_runs(const fs::path& test_folder) {
+  constexpr std::string_view kEnd = ".partial";
+  std::vector<UnfinishedRun> runs;
+  std::error_code ignored;  // another program may be putting one in its place
+  for (const fs::directory_entry& entry : fs::directory_iterator(test_folder, ignored)) {
+    const std::string name = entry.path().filename().string();
+    const std::size_t end = name.rfind(kEnd);
+    if (!name.starts_with(".seed-") || end == std::string::npos) continue;
+    const int handle = open(entry.path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (handle < 0) continue;
+    const bool is_running = flock(handle, LOCK_SH | LOCK_NB) != 0;
+    // Gone from here meanwhile: it has just been closed.
+    if (is_still_at(handle, entry.path())) {
+      runs.push_back({entry.path(), name.substr(1, end - 1), is_running});
+    }
+    ::close(handle);
+  }
+  std::sort(runs.begin(), runs.end(),
+            [](const UnfinishedRun& a, const UnfinishedRun& b) { return a.folder < b.folder; });
+  return runs;
+}
+
 }  // namespace orrery

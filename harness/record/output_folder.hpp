@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace orrery {
 
@@ -55,5 +56,14 @@ class OutputFolder {
   int lock_ = -1;  // of partial_, while this object lives
   bool closed_ = false;
 };
+
+/// A run that has not closed its folder.
+struct UnfinishedRun {
+  std::filesystem::path folder;  // hidden, with what it has written so far
+  std::string run;               // "seed-5"
+  bool is_running = false;       // false: its process was killed
+};
+/// Of one test, in the order of their names. @param test_folder  DIR/<Suite>.<Test>
+std::vector<UnfinishedRun> unfinished_runs(const std::filesystem::path& test_folder);
 
 }  // namespace orrery
