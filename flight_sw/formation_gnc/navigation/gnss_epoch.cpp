@@ -23,13 +23,13 @@ Mat3 rotation_of(const Quaternion& q) {
   const double s = 2.0 / (q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
   Mat3 R;
   R(0, 0) = 1.0 - s * (q.y * q.y + q.z * q.z);
-  R(0, 1) = s * (q.x * q.y + q.w * q.z);
-  R(0, 2) = s * (q.x * q.z - q.w * q.y);
-  R(1, 0) = s * (q.x * q.y - q.w * q.z);
+  R(0, 1) = s * (q.x * q.y - q.w * q.z);
+  R(0, 2) = s * (q.x * q.z + q.w * q.y);
+  R(1, 0) = s * (q.x * q.y + q.w * q.z);
   R(1, 1) = 1.0 - s * (q.x * q.x + q.z * q.z);
-  R(1, 2) = s * (q.y * q.z + q.w * q.x);
-  R(2, 0) = s * (q.x * q.z + q.w * q.y);
-  R(2, 1) = s * (q.y * q.z - q.w * q.x);
+  R(1, 2) = s * (q.y * q.z - q.w * q.x);
+  R(2, 0) = s * (q.x * q.z - q.w * q.y);
+  R(2, 1) = s * (q.y * q.z + q.w * q.x);
   R(2, 2) = 1.0 - s * (q.x * q.x + q.y * q.y);
   return R;
 }

@@ -12,7 +12,7 @@ using flight_support::kMuEarth_m3ps2;
 using flight_support::kSecond_ns;
 using flight_support::seconds;
 
-constexpr std::int64_t kEarthGrid_ns = 600 * kSecond_ns;
+constexpr std::int64_t kEarthGrid_ns = 120 * kSecond_ns;
 
 void push(Vec3* a, double s, const Vec3& b) {
   for (int k = 0; k < 3; ++k) (*a)[k] += s * b[k];
@@ -80,13 +80,17 @@ Mat3 EarthAttitude::ecef_to_eci(std::int64_t t_ns, const flight_support::EarthTi
     base_ = flight_support::ecef_to_eci(base_ns, earth_time);
     base_ns_ = base_ns;
   }
-  const double angle = flight_support::kEarthRotation_radps * seconds(t_ns - base_ns);
+  return turned_with_earth(base_, seconds(t_ns - base_ns));
+}
+
+Mat3 turned_with_earth(const Mat3& R_IE, double dt_s) {
+  const double angle = flight_support::kEarthRotation_radps * dt_s;
   const double c = std::cos(angle), s = std::sin(angle);
   Mat3 R;
   for (int r = 0; r < 3; ++r) {
-    R(r, 0) = base_(r, 0) * c + base_(r, 1) * s;
-    R(r, 1) = base_(r, 1) * c - base_(r, 0) * s;
-    R(r, 2) = base_(r, 2);
+    R(r, 0) = R_IE(r, 0) * c + R_IE(r, 1) * s;
+    R(r, 1) = R_IE(r, 1) * c - R_IE(r, 0) * s;
+    R(r, 2) = R_IE(r, 2);
   }
   return R;
 }

@@ -4,6 +4,7 @@
 
 namespace formation_gnc {
 
-typedef double Pair __attribute__((vector_size(16)));
+// Aligned as doubles are: flight heaps of 8-byte alignment must do.
+typedef double Pair __attribute__((vector_size(16), aligned(8)));
 
 }  // namespace formation_gnc

@@ -38,7 +38,7 @@ void SatelliteTable::prepare(const GnssEpoch& epoch, const EphemerisStore& ephem
     count_ = 0;
   }
   const std::int64_t before_ns = t_ns_ - flight_support::nanoseconds(kBefore_s);
-  const Mat3 R_IE = earth->ecef_to_eci(before_ns, earth_time);
+  const Mat3 R_IE = turned_with_earth(earth->ecef_to_eci(t_ns_, earth_time), -kBefore_s);
   for (int k = 0; k < epoch.count && count_ < kCapacity; ++k) {
     const int prn = epoch.observation[k].prn;
     if (prn < 1 || prn > 32 || find(prn) != nullptr) continue;
