@@ -5,9 +5,11 @@
 /// Prediction  Both spacecraft propagated numerically (RK4) with the field that navigation uses:
 ///             at 40 m, what a point mass leaves out is 12 mm after 5 min, J2 1.0 mm after 10 min,
 ///             20x20 0.12 mm. The response to an impulse comes from the same propagation.
-/// Law         The remaining trims (two at most at a time) minimise the expected sum of squared
-///             errors over tolerances, the execution error of the last one included: with two the
-///             target is met exactly, the last one alone is as small as the tolerances allow.
+/// Law         Trims at three fixed times before the observation, planned two at a time and anew
+///             before each: the first two take the formation to the target and stop it there, the
+///             last corrects what their execution and navigation got wrong. The impulses minimise
+///             the expected sum of squared errors over tolerances, the execution error of the
+///             later one included.
 /// Checked by  test_suites/unit/flight_sw/formation_gnc/fine_alignment_test.cpp
 #pragma once
 
@@ -28,8 +30,9 @@ struct AlignmentOptions {
   double separation_m = 40.0;
   ImpulseLimits limits = {};
   ThrusterErrors errors = {};
-  double first_trim_before_s = 1500.0;  ///< latest start of the pair of trims
-  double last_trim_before_s = 180.0;    ///< no trim later than that before the observation
+  double first_trim_before_s = 1800.0;  ///< before the observation
+  double middle_trim_before_s = 420.0;  ///< 0: there is none
+  double last_trim_before_s = 180.0;
   double longitudinal_m = 0.015, lateral_m = 0.018, lateral_mps = 2e-4;  ///< tolerances
 };
 
@@ -51,9 +54,9 @@ class FineAlignment {
   /// @param gravity  Outlives this object.
   FineAlignment(const GravityModel& gravity, const AlignmentOptions& options = {});
 
-  /// Trims from `earliest_ns` on, by the optics spacecraft (or, with the opposite sign, by the
-  /// detector: `optics_burns` false). Commanded values; divide by the thruster's scale before use
-  /// (ThrusterScale::command_for).
+  /// The next two trims that are not before `earliest_ns` (one or none, if there are no more), by
+  /// the optics spacecraft or by the detector. Deliver what is said: command it through
+  /// ThrusterScale::command_for. Impulses below the smallest possible are left out.
   TrimPlan plan(const AlignmentState& now, std::int64_t earliest_ns, std::int64_t observation_ns,
                 const flight_support::Vec3& sun_ECI, bool optics_burns) const;
 

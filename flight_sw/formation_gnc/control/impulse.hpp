@@ -18,7 +18,7 @@ struct Impulse {
 struct ImpulseLimits {
   double max_mps = 0.033 / 11.0;    ///< 33 mN s
   double min_mps = 0.25e-3 / 11.0;  ///< 10 ms at 25 mN
-  double spacing_s = 120.0;         ///< between the middles of two firings
+  double spacing_s = 122.0;         ///< between the middles of two firings; 120 s and their length
 };
 
 /// 1-sigma of what a firing really does.

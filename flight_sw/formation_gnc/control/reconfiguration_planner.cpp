@@ -1,6 +1,7 @@
 #include "formation_gnc/control/reconfiguration_planner.hpp"
 
 #include <cmath>
+#include <initializer_list>
 
 #include "formation_gnc/control/impulse_split.hpp"
 #include "support/orbit/constants.hpp"

@@ -4,7 +4,12 @@
 ///             along the direction in question: min over u of |r_RN(u)| - k sqrt(lambda_max
 ///             P_RN(u)). Relative elements and covariance drift under J2; a*da need not be zero.
 ///             Along-track distance counts for nothing.
-/// Escape      Burns over one revolution to parallel e and i vectors of `escape_m` and no a*da.
+/// Escape      Burns over one revolution to parallel e and i vectors of more than `escape_m` and no
+///             a*da, at the phase at which that costs least. One burn cannot do it: radial and
+///             normal burns turn the vectors apart, tangential ones leave a*da.
+/// Accuracy    The map to RTN is of first order in e: 1e-3 of the elements, a*dl included. Samples
+///             every 3 deg miss the minimum by 2.6 % of the vectors' length where it is zero, and
+///             by less than 0.1 % where they are parallel.
 /// Checked by  test_suites/unit/flight_sw/formation_gnc/separation_monitor_test.cpp
 #pragma once
 
@@ -19,15 +24,16 @@ struct SeparationOptions {
   double horizon_rev = 2.0;
   double science_m = 10.0;    ///< escape below that, in science
   double elsewhere_m = 50.0;  ///< and below that, in any other mode
-  double escape_m = 80.0;     ///< what an escape reaches at least, within one revolution
+  double escape_m = 80.0;     ///< what an escape reaches at least
   ImpulseLimits limits = {};
 };
 
-/// The estimate: absolute and relative position and velocity, differences of velocity in ECI.
+/// The estimate.
 struct SeparationState {
   std::int64_t t_ns = 0;
   flight_support::StateEci chief, deputy;
-  flight_support::Matrix6 relative_covariance_RTN;  ///< of (r, v)_DC, chief's RTN
+  /// Of (r, v) deputy less chief in the chief's RTN, derivative taken in RTN.
+  flight_support::Matrix6 relative_covariance_RTN;
 };
 
 struct SeparationForecast {
