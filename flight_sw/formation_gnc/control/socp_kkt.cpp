@@ -13,8 +13,8 @@ using ByRows = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 // Of the equilibrated problem, whose entries are about 1.
 constexpr double kRegularisation = 1e-11;
 constexpr double kPivotOfDiagonal = 1e-14;
-constexpr int kRefinements = 6;
-constexpr double kRefined = 1e-13;
+constexpr int kRefinements = 3;
+constexpr double kRefined = 1e-12;
 
 // Regularises and factors in place. Right-looking: every entry sees the same operations in the same
 // order on any machine, which blocked library kernels, tuned to caches, do not promise. Pivots that
