@@ -46,6 +46,7 @@ class NavigationScene {
     std::optional<formation_gnc::GnssEpoch> measured[2];
     formation_gnc::Quaternion q_BI[2];  // as known on board
     std::vector<formation_gnc::BroadcastEphemeris> ephemerides[2];
+    ByteBuffer bytes[2];  // all that the receivers sent
     OrbitState truth[2];
     double clock_m[2] = {};
   };
@@ -164,6 +165,7 @@ class NavigationScene {
       }
     };
     for (const FakeDeviceContext::ToFlight& sent : c.io.to_flight_log) {
+      e->bytes[k].insert(e->bytes[k].end(), sent.bytes.begin(), sent.bytes.end());
       const auto* bytes = reinterpret_cast<const unsigned char*>(sent.bytes.data());
       for (std::size_t at = 0; at < sent.bytes.size(); at += 512) {
         c.decoder.write(bytes + at, std::min<std::size_t>(512, sent.bytes.size() - at));
