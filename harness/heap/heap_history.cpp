@@ -8,12 +8,8 @@
 namespace orrery {
 namespace {
 
-// `later` follows `earlier`: one sample for both.
-HeapSample merged(const HeapSample& earlier, const HeapSample& later) {
-  HeapSample both = later;
-  both.transient_peak_bytes = std::max(earlier.transient_peak_bytes, later.transient_peak_bytes);
-  both.allocations += earlier.allocations;
-  return both;
+std::uint32_t narrow(std::uint64_t bytes) {
+  return static_cast<std::uint32_t>(std::min<std::uint64_t>(bytes, UINT32_MAX));
 }
 
 struct Line {
@@ -46,21 +42,55 @@ Line fit(const std::vector<double>& t, const std::vector<double>& y) {
 
 }  // namespace
 
+HeapHistory::Row HeapHistory::row_of(const HeapSample& sample) {
+  return {.t = sample.t,
+          .allocations = sample.allocations,
+          .resting_bytes = narrow(sample.resting_bytes),
+          .transient_peak_bytes = narrow(sample.transient_peak_bytes),
+          .heap_bytes = narrow(sample.heap_bytes),
+          .largest_free_bytes = narrow(sample.largest_free_bytes),
+          .free_list_length = narrow(sample.free_list_length)};
+}
+
+HeapSample HeapHistory::sample(std::size_t i) const {
+  const Row& row = rows_.at(i);
+  return {.t = row.t,
+          .resting_bytes = row.resting_bytes,
+          .transient_peak_bytes = row.transient_peak_bytes,
+          .heap_bytes = row.heap_bytes,
+          .largest_free_bytes = row.largest_free_bytes,
+          .free_list_length = row.free_list_length,
+          .allocations = row.allocations};
+}
+
+std::vector<HeapSample> HeapHistory::samples() const {
+  std::vector<HeapSample> all;
+  all.reserve(rows_.size());
+  for (std::size_t i = 0; i < rows_.size(); ++i) all.push_back(sample(i));
+  return all;
+}
+
+// `later` follows `earlier`: one for both.
+HeapHistory::Row HeapHistory::merged(const Row& earlier, const Row& later) {
+  Row both = later;
+  both.transient_peak_bytes = std::max(earlier.transient_peak_bytes, later.transient_peak_bytes);
+  both.allocations += earlier.allocations;
+  return both;
+}
+
 void HeapHistory::add(const HeapSample& call) {
   ++calls_;
   if (calls_in_last_ > 0 && calls_in_last_ < calls_per_sample_) {
-    samples_.back() = merged(samples_.back(), call);
+    rows_.back() = merged(rows_.back(), row_of(call));
     ++calls_in_last_;
     return;
   }
-  if (samples_.size() == kMost) {
-    for (std::size_t i = 0; i < kMost / 2; ++i) {
-      samples_[i] = merged(samples_[2 * i], samples_[2 * i + 1]);
-    }
-    samples_.resize(kMost / 2);
+  if (rows_.size() == kMost) {
+    for (std::size_t i = 0; i < kMost / 2; ++i) rows_[i] = merged(rows_[2 * i], rows_[2 * i + 1]);
+    rows_.resize(kMost / 2);
     calls_per_sample_ *= 2;
   }
-  samples_.push_back(call);
+  rows_.push_back(row_of(call));
   calls_in_last_ = 1;
 }
 

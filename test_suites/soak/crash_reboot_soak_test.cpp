@@ -24,12 +24,6 @@ std::int64_t resident_bytes() {
   return resident * sysconf(_SC_PAGESIZE);
 }
 
-// The history of the heap is a record: a sample per call, crash or not, until it holds its most. It
-// is counted apart, or a long run would show nothing else (3.7 MB).
-std::int64_t history_bytes(const FlightComputer& computer) {
-  return static_cast<std::int64_t>(computer.heap_history().samples().size() * sizeof(HeapSample));
-}
-
 bool in_full() {
   return std::getenv("ORRERY_SOAK") != nullptr;
 }
@@ -69,10 +63,10 @@ TEST_P(CrashRebootSoakTest, GrowsByLessThanAMegabyte) {
   };
   constexpr int kWarmUp = 200;
   cycle(kWarmUp);
-  const std::int64_t before = resident_bytes() - history_bytes(*computer);
+  const std::int64_t before = resident_bytes();
   const int count = in_full() ? GetParam().in_full : GetParam().briefly;
   cycle(count);
-  const std::int64_t grown = resident_bytes() - history_bytes(*computer) - before;
+  const std::int64_t grown = resident_bytes() - before;
   std::printf("  %d cycles: grown by %lld bytes\n", count, static_cast<long long>(grown));
   EXPECT_EQ(computer->crashes(), static_cast<std::uint64_t>(kWarmUp + count));
   EXPECT_TRUE(computer->alive());
