@@ -30,13 +30,14 @@
 
 namespace formation_gnc {
 
+/// Degree, step and time constant outside their ranges are brought to the nearest end.
 struct FilterOptions {
   OrbitPairOptions orbit = {};
 
   /// Empirical acceleration of self, 1 sigma [m/s^2]; 2e-5 covers what a field of 20x20 omits at
   /// 550 km.
   double empirical_sigma_mps2 = 2e-5;
-  double empirical_tau_s = 200.0;
+  double empirical_tau_s = 200.0;  ///< at least four steps
   /// Of the difference: differential drag and radiation, and per metre of separation the omitted
   /// gravity gradient [1/s^2].
   double relative_sigma_mps2 = 1e-9;
@@ -60,8 +61,8 @@ struct FilterOptions {
   IntegerOptions integers = {};
 };
 
-/// What one update did, for monitoring; chi2 is the sum of nu^2 / S of all scalars tried that were
-/// not rejected.
+/// What one update did, for monitoring. Over scalars that were used, chi2 is the sum of nu^2 / S,
+/// of as many degrees of freedom, less one for GRAPHIC: its clock was started from the same codes.
 struct UpdateReport {
   int used = 0, rejected = 0;
   double chi2 = 0.0;

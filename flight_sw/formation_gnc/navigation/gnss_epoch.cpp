@@ -34,6 +34,11 @@ Mat3 rotation_of(const Quaternion& q) {
   return R;
 }
 
+bool is_plausible(const Quaternion& q) {
+  const double square = q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z;
+  return square > 0.25 && square < 4.0;
+}
+
 bool is_plausible(const GnssEpoch& epoch) {
   if (epoch.t_ns <= 0 || epoch.t_ns >= kMaxEpoch_ns) return false;
   if (epoch.count < 0 || epoch.count > kChannels) return false;

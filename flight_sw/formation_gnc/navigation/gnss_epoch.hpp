@@ -16,8 +16,11 @@ using flight_support::Vec3;
 struct Quaternion {
   double w = 1.0, x = 0.0, y = 0.0, z = 0.0;
 };
-/// R_BI, which does to components what the Hamilton product q_BI (0, f) q_BI* does; any length above 0.
+/// R_BI, which does to components what the Hamilton product q_BI (0, f) q_BI* does; any length
+/// above 0.
 Mat3 rotation_of(const Quaternion& q_BI);
+/// Finite, and of a length between 0.5 and 2.
+bool is_plausible(const Quaternion& q_BI);
 
 /// One satellite of GPS on L1 C/A.
 struct Observation {

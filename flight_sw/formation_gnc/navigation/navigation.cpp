@@ -80,7 +80,7 @@ bool Navigation::accept_time(Who who, std::int64_t t_ns) {
 }
 
 void Navigation::insert(Who who, const GnssEpoch& epoch, const Quaternion& q_BI) {
-  if (!is_plausible(epoch) || !accept_time(who, epoch.t_ns)) {
+  if (!is_plausible(epoch) || !is_plausible(q_BI) || !accept_time(who, epoch.t_ns)) {
     ++statistics_.dropped;
     return;
   }

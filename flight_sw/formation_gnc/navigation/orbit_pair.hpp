@@ -23,7 +23,7 @@ using flight_support::Vec3;
 struct OrbitPairOptions {
   int gravity_degree = 20;  ///< 2 to 20
   flight_support::EarthTime earth_time = {};
-  double longest_step_s = 15.0;
+  double longest_step_s = 15.0;  ///< 1 to 30
 };
 
 /// Centres of mass, ECI; index by Who.

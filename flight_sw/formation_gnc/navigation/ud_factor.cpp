@@ -43,12 +43,20 @@ Projection UdFactor::project(const SparseRow& h) const {
     if (used[p]) list[count++] = p;
   }
   Projection out;
-  for (int j = 0; j < kStates; ++j) {
-    const Pair* column = upper_ + offset(j);
-    Pair sum = {0.0, 0.0};
-    for (int k = 0; k < count && list[k] < pairs(j); ++k) sum += dense[list[k]] * column[list[k]];
-    out.f[j] = dense[j / 2][j % 2] + sum[0] + sum[1];
+  // An even column and the odd one behind it, which has one pair more.
+  for (int j = 0; j < kStates; j += 2) {
+    const Pair *even = upper_ + offset(j), *odd = upper_ + offset(j + 1);
+    Pair sum0 = {0.0, 0.0}, sum1 = {0.0, 0.0};
+    int k = 0;
+    for (; k < count && list[k] < j / 2; ++k) {
+      sum0 += dense[list[k]] * even[list[k]];
+      sum1 += dense[list[k]] * odd[list[k]];
+    }
+    if (k < count && list[k] == j / 2) sum1 += dense[j / 2] * odd[j / 2];
+    out.f[j] = dense[j / 2][0] + sum0[0] + sum0[1];
+    out.f[j + 1] = dense[j / 2][1] + sum1[0] + sum1[1];
     out.variance += out.f[j] * out.f[j] * d_[j];
+    out.variance += out.f[j + 1] * out.f[j + 1] * d_[j + 1];
   }
   return out;
 }

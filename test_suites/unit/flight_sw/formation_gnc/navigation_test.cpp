@@ -520,6 +520,8 @@ TEST_F(NavigationTest, RubbishIsSurvived) {
         if (random.bernoulli(0.05)) m.observation[o].code_m += 1000;
       }
       if (random.bernoulli(0.05)) m.count = 1000;
+      if (random.bernoulli(0.05)) e.q_BI[craft] = {0, 0, 0, 0};
+      if (random.bernoulli(0.05)) e.q_BI[craft].y = NAN;
       if (random.bernoulli(0.05)) m.r_ECEF[1] = INFINITY;
       if (random.bernoulli(0.05)) m.t_ns = random.integer(-1'000'000, 2'000'000'000'000'000'000);
     }
