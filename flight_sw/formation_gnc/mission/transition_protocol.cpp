@@ -37,6 +37,8 @@ std::uint32_t store(const TransitionRecord& record, unsigned char (&to)[kTransit
   writer.u32(record.emergencies);
   writer.u32(record.peer_emergencies);
   writer.u32(record.fault);
+  writer.u32(record.observation);
+  writer.i64(record.last_window_ns);
   put(&writer, record.current);
   put(&writer, record.pending);
   orrery_put_u32(to + writer.bytes(), flight_crc32_common(to, writer.bytes()));
@@ -56,6 +58,8 @@ bool restore(const unsigned char* from, std::uint32_t bytes, TransitionRecord* r
   read.emergencies = reader.u32();
   read.peer_emergencies = reader.u32();
   read.fault = reader.u32();
+  read.observation = reader.u32();
+  read.last_window_ns = reader.i64();
   if (!get(&reader, &read.current) || !get(&reader, &read.pending) || !reader.whole()) return false;
   *record = read;
   return true;
@@ -83,6 +87,7 @@ bool TransitionProtocol::announce(const Event& event, std::int64_t now_ns) {
   record_.pending = event;
   record_.pending.id = ++record_.last_id;
   record_.has_pending = true;
+  if (event.kind == Event::Kind::kObservation) record_.last_window_ns = event.begin_ns;
   needs_announcement_ = true;
   announced_ = false;
   change();
@@ -119,6 +124,8 @@ void TransitionProtocol::emergency(Mode mode, std::uint32_t fault, std::int64_t 
 void TransitionProtocol::enter(Mode mode, const Event& event) {
   record_.mode = mode;
   record_.current = event;
+  record_.observation = 0;
+  record_.last_window_ns = 0;
   change();
 }
 
@@ -143,7 +150,12 @@ void TransitionProtocol::execute(std::int64_t now_ns) {
   drop_pending();
   record_.executed_id = event.id;
   record_.committed_id = std::max(record_.committed_id, event.id);
-  if (event.kind == Event::Kind::kMode) enter(event.mode, event);
+  if (event.kind == Event::Kind::kMode) {
+    enter(event.mode, event);
+  } else {
+    record_.observation = event.observations;
+    record_.last_window_ns = event.begin_ns;
+  }
   if (late) ++late_;
   push({event, late, false});
 }

@@ -46,6 +46,8 @@ struct TransitionRecord {
   std::uint32_t last_id = 0;  ///< leader: the last one given out
   std::uint32_t emergencies = 0, peer_emergencies = 0;
   std::uint32_t fault = FORMATION_GNC_NO_FAULT;  ///< of the last emergency
+  std::uint32_t observation = 0;                 ///< of this campaign: number of the last
+  std::int64_t last_window_ns = 0;  ///< begin of the last one announced, in this campaign; 0: none
 };
 
 constexpr std::uint32_t kTransitionRecordBytes = 128;
