@@ -15,6 +15,7 @@ struct CarrierArc {
   float lock_s = 0.0f;            ///< as last reported
   std::int64_t begin_ns = 0;      ///< first epoch of the arc
   std::int64_t last_ns = 0;       ///< latest epoch
+  std::int64_t walked_ns = 0;     ///< until when its process noise is in the covariance
   double base_cycles = 0.0;       ///< an integer, taken off the phase to keep numbers small
   double ambiguity_cycles = 0.0;  ///< the filter's estimate, of phase less base
 };

@@ -42,54 +42,81 @@ Matrix<6, 6> to_RTN(const Vec3& r, const Vec3& v) {
 void fill_relative(FormationEstimate* e) {
   e->r_relative_ECI = e->r_other_ECI - e->r_self_ECI;
   e->v_relative_ECI = e->v_other_ECI - e->v_self_ECI;
-  const Matrix<6, 6> M = to_RTN(e->r_self_ECI, e->v_self_ECI);
-  Matrix<6, 6> P;
   flight_support::Vector<6> x;
   for (int i = 0; i < 3; ++i) {
     x[i] = e->r_relative_ECI[i];
     x[i + 3] = e->v_relative_ECI[i];
   }
-  for (int i = 0; i < 6; ++i) {
-    for (int j = 0; j < 6; ++j) P(i, j) = e->covariance(i + 6, j + 6);
-  }
-  const flight_support::Vector<6> y = M * x;
+  const flight_support::Vector<6> y = to_RTN(e->r_self_ECI, e->v_self_ECI) * x;
   for (int i = 0; i < 3; ++i) {
     e->r_relative_RTN[i] = y[i];
     e->v_relative_RTN[i] = y[i + 3];
   }
+}
+
+void fill_relative_covariance(FormationEstimate* e) {
+  Matrix<6, 6> P;
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) P(i, j) = e->covariance(i + 6, j + 6);
+  }
+  const Matrix<6, 6> M = to_RTN(e->r_self_ECI, e->v_self_ECI);
   e->relative_covariance_RTN = symmetric(M * P * transpose(M));
 }
 
-FormationEstimate told_by(const FormationFilter& filter) {
-  FormationEstimate e;
-  e.valid = filter.other_started() && !filter.lost();
-  e.fixed_ambiguities = filter.integers().count();
-  e.fixed = e.fixed_ambiguities >= kFewestFixed;
-  e.t_ns = filter.t_ns();
-  e.r_self_ECI = filter.orbits().r[0];
-  e.v_self_ECI = filter.orbits().v[0];
-  e.r_other_ECI = filter.orbits().r[1];
-  e.v_other_ECI = filter.orbits().v[1];
-  e.covariance = told_covariance(filter.covariance());
-  fill_relative(&e);
-  return e;
+void fill_orbits(const OrbitPair& orbits, FormationEstimate* e) {
+  e->r_self_ECI = orbits.r[0];
+  e->v_self_ECI = orbits.v[0];
+  e->r_other_ECI = orbits.r[1];
+  e->v_other_ECI = orbits.v[1];
+  fill_relative(e);
 }
 
 }  // namespace
 
-FormationEstimate Navigation::at(std::int64_t t_ns) const {
-  FormationEstimate none;
-  none.t_ns = t_ns;
-  if (!filter_.started() || processed_ == 0) return none;
-  const bool ahead = t_ns >= filter_.t_ns();
-  const int before = ring_.last_until(t_ns);
-  if (!ahead && before < 0) return none;
-  FormationFilter moved = ahead ? filter_ : ring_[before].after_own;
-  if (!moved.started() || seconds(t_ns - moved.t_ns()) > kLongestPrediction_s) return none;
-  moved.time_update(t_ns, maneuvers_);
-  FormationEstimate e = told_by(moved);
+// The filter as it stood nearest before `t_ns`, if that is near enough.
+const FormationFilter* Navigation::filter_for(std::int64_t t_ns) const {
+  if (!filter_.started() || processed_ == 0) return nullptr;
+  const FormationFilter* filter = &filter_;
+  if (t_ns < filter_.t_ns()) {
+    const int before = ring_.last_until(t_ns);
+    if (before < 0) return nullptr;
+    filter = &ring_[before].after_own;
+  }
+  const bool near = seconds(t_ns - filter->t_ns()) <= kLongestPrediction_s;
+  return filter->started() && near ? filter : nullptr;
+}
+
+FormationEstimate Navigation::told_by(const FormationFilter& filter) const {
+  FormationEstimate e;
+  e.valid = filter.other_started() && !filter.lost();
+  e.fixed_ambiguities = filter.integers().count();
+  e.fixed = e.fixed_ambiguities >= kFewestFixed;
   e.last_own_ns = last_own_ns_;
   e.last_remote_ns = last_remote_ns_;
+  return e;
+}
+
+FormationEstimate Navigation::at(std::int64_t t_ns) const {
+  FormationEstimate e;
+  if (const FormationFilter* filter = filter_for(t_ns)) {
+    FormationFilter moved = *filter;
+    moved.time_update(t_ns, maneuvers_);
+    e = told_by(moved);
+    fill_orbits(moved.orbits(), &e);
+    e.covariance = told_covariance(moved.covariance());
+    fill_relative_covariance(&e);
+  }
+  e.t_ns = t_ns;
+  return e;
+}
+
+FormationEstimate Navigation::state_at(std::int64_t t_ns) const {
+  FormationEstimate e;
+  if (const FormationFilter* filter = filter_for(t_ns)) {
+    e = told_by(*filter);
+    fill_orbits(filter->orbits_at(t_ns, maneuvers_), &e);
+  }
+  e.t_ns = t_ns;
   return e;
 }
 
@@ -99,6 +126,9 @@ FormationEstimate seen_from_other(const FormationEstimate& estimate) {
   e.v_self_ECI = estimate.v_other_ECI;
   e.r_other_ECI = estimate.r_self_ECI;
   e.v_other_ECI = estimate.v_self_ECI;
+  e.last_own_ns = estimate.last_remote_ns;
+  e.last_remote_ns = estimate.last_own_ns;
+  fill_relative(&e);
   // (other, -difference) from (self, difference).
   Matrix<12, 12> M;
   for (int k = 0; k < 6; ++k) {
@@ -106,9 +136,7 @@ FormationEstimate seen_from_other(const FormationEstimate& estimate) {
     M(k + 6, k + 6) = -1.0;
   }
   e.covariance = symmetric(M * estimate.covariance * transpose(M));
-  e.last_own_ns = estimate.last_remote_ns;
-  e.last_remote_ns = estimate.last_own_ns;
-  fill_relative(&e);
+  fill_relative_covariance(&e);
   return e;
 }
 

@@ -14,6 +14,9 @@ constexpr int kGoodEpochsToTrust = 10;
 constexpr int kOpenings = 2;
 constexpr double kOpened_r_m[kOpenings] = {0.1, 100.0}, kOpened_v_mps[kOpenings] = {0.005, 0.5};
 constexpr double kContradiction_sigmas = 5.0;
+// Memory of the slow test: 0.8 per epoch is five epochs.
+constexpr double kMemory = 0.8;
+constexpr double kSlow_sigmas = 7.0;
 
 // chi2 of as many degrees of freedom beyond what happens once in 3 million epochs (Wilson &
 // Hilferty 1931).
@@ -23,6 +26,18 @@ bool contradicts(const UpdateReport& report) {
   const double w = 2.0 / (9.0 * report.used);
   const double root = 1.0 - w + kContradiction_sigmas * std::sqrt(w);
   return report.chi2 > report.used * root * root * root;
+}
+
+// A burn of some 0.1 mm/s passes the test of each epoch and fails that of several: a fading sum of
+// chi2, whose mean and variance are those of the degrees of freedom that went into it.
+bool contradicts(const FadingChi2& sum) {
+  return sum.chi2 > sum.mean + kSlow_sigmas * std::sqrt(sum.variance);
+}
+
+void add(const UpdateReport& report, FadingChi2* sum) {
+  sum->chi2 = kMemory * sum->chi2 + report.chi2;
+  sum->mean = kMemory * sum->mean + report.used;
+  sum->variance = kMemory * kMemory * sum->variance + 2.0 * report.used;
 }
 
 }  // namespace
@@ -46,13 +61,17 @@ UpdateReport FormationFilter::sdcp_update(const GnssEpoch& self, const Quaternio
   // Slips show in the lock times. When phases as a whole contradict the state nevertheless,
   // somebody burned whom nobody told, or not as told: the orbit is opened, ambiguities and integers
   // stay good.
-  for (int size = 0; size < kOpenings && contradicts(report); ++size) {
+  FadingChi2 sum = fading_;
+  add(report, &sum);
+  for (int size = 0; size < kOpenings && (contradicts(report) || contradicts(sum)); ++size) {
     ud_ = before;
     for (double& c : correction_) c = 0.0;
     open_relative_orbit(kOpened_r_m[size], kOpened_v_mps[size]);
     report = take_all(&all);
+    sum = FadingChi2();
     ++openings_;
   }
+  fading_ = sum;
   settle();
   judge(report, all);
   return report;

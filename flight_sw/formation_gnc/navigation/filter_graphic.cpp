@@ -50,7 +50,7 @@ void FormationFilter::start_ambiguity(int who, int channel, const Observation& o
   arc = CarrierArc();
   arc.prn = o.prn;
   arc.half_cycle = o.half_cycle;
-  arc.begin_ns = t_ns_;
+  arc.begin_ns = arc.walked_ns = t_ns_;
   const double difference = o.phase_cycles - o.code_m / kWavelength_m;
   arc.base_cycles = std::nearbyint(difference);
   arc.ambiguity_cycles = difference - arc.base_cycles;

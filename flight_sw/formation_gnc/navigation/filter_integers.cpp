@@ -6,6 +6,17 @@ namespace formation_gnc {
 
 using flight_support::seconds;
 
+namespace {
+
+// sign * (channel less reference), in ascending order.
+void add_difference(int first, int channel, int reference, double sign, SparseRow* h) {
+  const bool in_order = channel < reference;
+  h->add(first + (in_order ? channel : reference), in_order ? sign : -sign);
+  h->add(first + (in_order ? reference : channel), in_order ? -sign : sign);
+}
+
+}  // namespace
+
 int FormationFilter::find_candidates(IntegerCandidate* candidates) const {
   int count = 0;
   for (int channel = 0; channel < kChannels; ++channel) {
@@ -91,10 +102,8 @@ int FormationFilter::hold(const IntegerChoice& choice, const IntegerCandidate& r
 void FormationFilter::constrain(const IntegerCandidate& d, const IntegerCandidate& reference,
                                 double innovation) {
   SparseRow h;
-  h.add(kAmbiguitySelf + d.channel_self, -1.0);
-  h.add(kAmbiguitySelf + reference.channel_self, 1.0);
-  h.add(kAmbiguityOther + d.channel_other, 1.0);
-  h.add(kAmbiguityOther + reference.channel_other, -1.0);
+  add_difference(kAmbiguitySelf, d.channel_self, reference.channel_self, -1.0, &h);
+  add_difference(kAmbiguityOther, d.channel_other, reference.channel_other, 1.0, &h);
   double nu = innovation, gain[kStates];
   for (int k = 0; k < h.count; ++k) nu -= h.value[k] * correction_[h.state[k]];
   ud_.measure(ud_.project(h), square(options_.integers.hold_sigma_cycles), gain);

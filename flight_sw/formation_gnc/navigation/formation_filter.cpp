@@ -9,7 +9,7 @@ namespace {
 
 using flight_support::seconds;
 
-constexpr std::int64_t kWalkStep_ns = 60 * flight_support::kSecond_ns;
+constexpr int kWalksPerUpdate = 2;
 
 }  // namespace
 
@@ -25,7 +25,7 @@ FormationFilter::FormationFilter(const FilterOptions& options) : options_(option
 void FormationFilter::start(std::int64_t t_ns, const Vec3& r_ECI, const Vec3& v_ECI,
                             double sigma_r_m, double sigma_v_mps) {
   *this = FormationFilter(options_);
-  t_ns_ = walked_ns_ = t_ns;
+  t_ns_ = t_ns;
   started_ = true;
   const double r = std::fmax(sigma_r_m, options_.start_sigma_r_m);
   const double v = std::fmax(sigma_v_mps, options_.start_sigma_v_mps);
@@ -71,9 +71,20 @@ void FormationFilter::forget_clocks() {
 
 void FormationFilter::time_update(std::int64_t t_ns, const ManeuverList& maneuvers) {
   if (!started_ || t_ns <= t_ns_) return;
-  const std::int64_t from_ns = t_ns_;
   forget_clocks();
-  // Shares of manoeuvres by the instant at which they act, each once.
+  move_to(t_ns, maneuvers, What::kAll);
+  walk_ambiguities();
+}
+
+OrbitPair FormationFilter::orbits_at(std::int64_t t_ns, const ManeuverList& maneuvers) const {
+  FormationFilter moved = *this;
+  moved.move_to(t_ns, maneuvers, What::kOrbitsOnly);
+  return moved.orbits_;
+}
+
+// Shares of manoeuvres by the instant at which they act, each once.
+void FormationFilter::move_to(std::int64_t t_ns, const ManeuverList& maneuvers, What what) {
+  const std::int64_t from_ns = t_ns_;
   bool done[ManeuverList::kCapacity] = {};
   for (;;) {
     int next = -1;
@@ -86,39 +97,41 @@ void FormationFilter::time_update(std::int64_t t_ns, const ManeuverList& maneuve
         next_ns = at_ns;
       }
     }
-    step_to(next_ns);
-    if (next < 0) break;
+    step_to(next_ns, what);
+    if (next < 0) return;
     apply_maneuver(maneuvers[next], maneuvers.share(next, from_ns, t_ns));
     done[next] = true;
   }
-  if (t_ns_ - walked_ns_ >= kWalkStep_ns) walk_ambiguities();
 }
 
-// In steps that are short against the change of geometry, but not at every epoch: it costs 12
-// additions of rank one.
+// Two satellites at each update, in turn: at 10 s each of twelve once a minute, which is short
+// against the change of geometry. All at each would cost a quarter of the epoch.
 void FormationFilter::walk_ambiguities() {
   const double sigma_cycles = options_.broadcast_walk_mps05 / (0.5 * kWavelength_m);
-  const double variance = square(sigma_cycles) * seconds(t_ns_ - walked_ns_);
-  walked_ns_ = t_ns_;
-  for (int prn = 1; prn <= 32; ++prn) {
-    const int at_self = arcs_[kSelf].find(prn), at_other = arcs_[kOther].find(prn);
+  for (int tried = 0, walked = 0; tried < 32 && walked < kWalksPerUpdate; ++tried) {
+    walk_prn_ = static_cast<std::uint8_t>(walk_prn_ % 32 + 1);
+    const int at_self = arcs_[kSelf].find(walk_prn_), at_other = arcs_[kOther].find(walk_prn_);
+    if (at_self < 0 && at_other < 0) continue;
+    CarrierArc& arc = at_self >= 0 ? arcs_[kSelf][at_self] : arcs_[kOther][at_other];
     double g[kStates] = {};
     if (at_self >= 0) g[kAmbiguitySelf + at_self] = 1.0;
     if (at_other >= 0) g[kAmbiguityOther + at_other] = 1.0;
     const int last = at_other >= 0 ? kAmbiguityOther + at_other : kAmbiguitySelf + at_self;
-    if (at_self >= 0 || at_other >= 0) ud_.add(variance, g, last);
+    ud_.add(square(sigma_cycles) * seconds(t_ns_ - arc.walked_ns), g, last);
+    arc.walked_ns = t_ns_;
+    ++walked;
   }
 }
 
-void FormationFilter::step_to(std::int64_t t_ns) {
+void FormationFilter::step_to(std::int64_t t_ns, What what) {
   const std::int64_t span_ns = t_ns - t_ns_;
   const int steps = static_cast<int>(std::ceil(seconds(span_ns) / options_.orbit.longest_step_s));
   const std::int64_t begin_ns = t_ns_;
   for (int k = 1; k <= steps; ++k)
-    step(begin_ns + span_ns / steps * k + (k == steps ? span_ns % steps : 0));
+    step(begin_ns + span_ns / steps * k + (k == steps ? span_ns % steps : 0), what);
 }
 
-void FormationFilter::step(std::int64_t t_ns) {
+void FormationFilter::step(std::int64_t t_ns, What what) {
   const double dt_s = seconds(t_ns - t_ns_);
   const OrbitPair before = orbits_;
   coast(&orbits_, t_ns_, dt_s, options_.orbit, &earth_);
@@ -131,11 +144,12 @@ void FormationFilter::step(std::int64_t t_ns) {
     orbits_.v[k] = orbits_.v[k] + transition.va * orbits_.empirical_RTN[k];
     orbits_.empirical_RTN[k] = transition.aa * orbits_.empirical_RTN[k];
   }
+  t_ns_ = t_ns;
+  if (what == What::kOrbitsOnly) return;
   const Mat3 R_IH = rtn_to_eci(r_middle, v_middle);
   ud_.move_orbits(transition,
                   orbit_noise(R_IH, dt_s, options_.empirical_sigma_mps2, options_.empirical_tau_s),
                   orbit_noise(R_IH, dt_s, relative_sigma_mps2(), options_.empirical_tau_s));
-  t_ns_ = t_ns;
 }
 
 void FormationFilter::apply_maneuver(const Maneuver& m, double share) {

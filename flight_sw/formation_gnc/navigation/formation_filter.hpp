@@ -68,6 +68,11 @@ struct UpdateReport {
   double chi2 = 0.0;
 };
 
+/// Of the latest epochs' single differences, older ones fading.
+struct FadingChi2 {
+  double chi2 = 0.0, mean = 0.0, variance = 0.0;
+};
+
 class FormationFilter {
  public:
   explicit FormationFilter(const FilterOptions& options = {});
@@ -82,6 +87,8 @@ class FormationFilter {
 
   /// To `t_ns` (not before the filter's time), over the manoeuvres in between.
   void time_update(std::int64_t t_ns, const ManeuverList& maneuvers);
+  /// Where time_update() would move both, at a third of its cost.
+  OrbitPair orbits_at(std::int64_t t_ns, const ManeuverList& maneuvers) const;
   /// GRAPHIC of one receiver at the filter's time. `satellites` holds those of this epoch.
   UpdateReport graphic_update(Who who, const GnssEpoch& epoch, const Quaternion& q_BI,
                               const SatelliteTable& satellites);
@@ -114,8 +121,10 @@ class FormationFilter {
 
   double relative_sigma_mps2() const;
   void forget_clocks();
-  void step_to(std::int64_t t_ns);
-  void step(std::int64_t t_ns);
+  enum class What { kAll, kOrbitsOnly };
+  void move_to(std::int64_t t_ns, const ManeuverList& maneuvers, What what);
+  void step_to(std::int64_t t_ns, What what);
+  void step(std::int64_t t_ns, What what);
   void apply_maneuver(const Maneuver& maneuver, double share);
   void walk_ambiguities();
 
@@ -150,7 +159,9 @@ class FormationFilter {
   std::uint8_t bad_epochs_ = 0, good_epochs_ = 0, resets_in_a_row_ = 0;
   std::uint8_t bad_graphic_[2] = {};
   std::uint32_t openings_ = 0;
-  std::int64_t t_ns_ = 0, walked_ns_ = 0;
+  FadingChi2 fading_;
+  std::int64_t t_ns_ = 0;
+  std::uint8_t walk_prn_ = 0;  // whose ambiguities walked last
   OrbitPair orbits_;
   EarthAttitude earth_;  // kept, since its base holds for many steps
   double clock_m_[2] = {};

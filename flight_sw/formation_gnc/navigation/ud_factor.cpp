@@ -32,62 +32,89 @@ UdFactor::UdFactor() {
 }
 
 Projection UdFactor::project(const SparseRow& h) const {
-  Pair dense[kStates / 2] = {};
-  bool used[kStates / 2] = {};
-  for (int k = 0; k < h.count; ++k) {
-    dense[h.state[k] / 2][h.state[k] % 2] = h.value[k];
-    used[h.state[k] / 2] = true;
-  }
-  int list[SparseRow::kMost], count = 0;
-  for (int p = 0; p < kStates / 2; ++p) {
-    if (used[p]) list[count++] = p;
-  }
+  // By pairs: where h is not zero, in ascending order.
+  Pair part[SparseRow::kMost];
+  int place[SparseRow::kMost], count = 0;
   Projection out;
+  for (double& f : out.f) f = 0.0;
+  for (int k = 0; k < h.count; ++k) {
+    const int p = h.state[k] / 2;
+    if (count == 0 || place[count - 1] != p) {
+      part[count] = Pair{0.0, 0.0};
+      place[count++] = p;
+    }
+    part[count - 1][h.state[k] % 2] = h.value[k];
+    out.f[h.state[k]] = h.value[k];
+  }
   // An even column and the odd one behind it, which has one pair more.
-  for (int j = 0; j < kStates; j += 2) {
+  int above = 0;  // parts above the diagonal of both
+  for (int j = 2 * place[0]; j < kStates; j += 2) {
     const Pair *even = upper_ + offset(j), *odd = upper_ + offset(j + 1);
     Pair sum0 = {0.0, 0.0}, sum1 = {0.0, 0.0};
-    int k = 0;
-    for (; k < count && list[k] < j / 2; ++k) {
-      sum0 += dense[list[k]] * even[list[k]];
-      sum1 += dense[list[k]] * odd[list[k]];
+    for (int k = 0; k < above; ++k) {
+      sum0 += part[k] * even[place[k]];
+      sum1 += part[k] * odd[place[k]];
     }
-    if (k < count && list[k] == j / 2) sum1 += dense[j / 2] * odd[j / 2];
-    out.f[j] = dense[j / 2][0] + sum0[0] + sum0[1];
-    out.f[j + 1] = dense[j / 2][1] + sum1[0] + sum1[1];
+    if (above < count && place[above] == j / 2) {
+      sum1 += part[above] * odd[j / 2];
+      ++above;
+    }
+    out.f[j] += sum0[0] + sum0[1];
+    out.f[j + 1] += sum1[0] + sum1[1];
     out.variance += out.f[j] * out.f[j] * d_[j];
     out.variance += out.f[j + 1] * out.f[j + 1] * d_[j + 1];
   }
   return out;
 }
 
+namespace {
+
+// The inner loop of Bierman's update for two columns: each number goes through his operations in
+// their order.
+struct Columns {
+  Pair lambda0, lambda1, v0, v1;
+
+  void at(Pair* even, Pair* odd, Pair* b) const {
+    const Pair u0 = *even, u1 = *odd, b0 = *b, b1 = b0 + v0 * u0;
+    *even = u0 + lambda0 * b0;
+    *odd = u1 + lambda1 * b1;
+    *b = b1 + v1 * u1;
+  }
+};
+
+}  // namespace
+
 // Two columns at a time, an even one and the odd one behind it, which saves a third of the memory
-// traffic; each number goes through the operations of Bierman's loop in their order.
+// traffic.
 void UdFactor::measure(const Projection& h, double r, double* gain) {
-  Pair b[kStates / 2] = {};
-  double alpha = r;
+  Pair b[kStates / 2];
+  double alpha = r, inverse = 1.0 / r;
   for (int j = 0; j < kStates; j += 2) {
     const double v0 = d_[j] * h.f[j], v1 = d_[j + 1] * h.f[j + 1];
-    const double lambda0 = -h.f[j] / alpha;
-    const double middle = alpha + h.f[j] * v0;
-    const double lambda1 = -h.f[j + 1] / middle;
-    d_[j] *= alpha / middle;
+    const double middle = alpha + h.f[j] * v0, middle_inverse = 1.0 / middle;
+    const double lambda0 = -h.f[j] * inverse, lambda1 = -h.f[j + 1] * middle_inverse;
+    d_[j] *= alpha * middle_inverse;
     alpha = middle + h.f[j + 1] * v1;
-    d_[j + 1] *= middle / alpha;
-    Pair *even = upper_ + offset(j), *odd = upper_ + offset(j + 1);
-    for (int p = 0; p < j / 2; ++p) {
-      const Pair u0 = even[p], u1 = odd[p], b0 = b[p], b1 = b0 + v0 * u0;
-      even[p] = u0 + lambda0 * b0;
-      odd[p] = u1 + lambda1 * b1;
-      b[p] = b1 + v1 * u1;
+    inverse = 1.0 / alpha;
+    d_[j + 1] *= middle * inverse;
+    Pair *even = upper_ + offset(j), *odd = even + j / 2;
+    const Columns columns = {{lambda0, lambda0}, {lambda1, lambda1}, {v0, v0}, {v1, v1}};
+    int p = 0;
+    for (; p + 1 < j / 2; p += 2) {
+      columns.at(even + p, odd + p, b + p);
+      columns.at(even + p + 1, odd + p + 1, b + p + 1);
     }
+    if (p < j / 2) columns.at(even + p, odd + p, b + p);
     // The odd column's last element stands beside the even one's diagonal.
     const double u = odd[j / 2][0];
     odd[j / 2][0] = u + lambda1 * v0;
     b[j / 2] = Pair{v0 + v1 * u, v1};
   }
-  const double scale = 1.0 / alpha;
-  for (int j = 0; j < kStates; ++j) gain[j] = scale * b[j / 2][j % 2];
+  for (int p = 0; p < kStates / 2; ++p) {
+    const Pair k = inverse * b[p];
+    gain[2 * p] = k[0];
+    gain[2 * p + 1] = k[1];
+  }
 }
 
 void UdFactor::add(double w, const double* g, int last) {

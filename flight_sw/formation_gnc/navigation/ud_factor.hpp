@@ -15,7 +15,7 @@
 
 namespace formation_gnc {
 
-/// A row of a measurement matrix that is mostly zeros; states in ascending order.
+/// A row of a measurement matrix that is mostly zeros; states in ascending order, at least one.
 struct SparseRow {
   static constexpr int kMost = 12;
   int count = 0;
