@@ -126,8 +126,19 @@ FormationFilter::Difference FormationFilter::difference(const Observation& o_sel
                  kWavelength_m * (other.ambiguity_cycles - self.ambiguity_cycles);
   d.r = square(phase_sigma_m(static_cast<double>(o_self.cn0_dBHz))) +
         square(phase_sigma_m(static_cast<double>(o_other.cn0_dBHz))) +
-        2.0 * square(options_.phase_floor_m);
+        2.0 * square(options_.phase_floor_m) + square(unshared_ionosphere_m(p_other.line_of_sight));
   return d;
+}
+
+// Change of Lear's mapping function m(E) = 2.037 / (q + sin E), q^2 = sin^2 E + 0.076, over the
+// angle at the Earth's centre between both.
+double FormationFilter::unshared_ionosphere_m(const Vec3& line_of_sight) const {
+  const double radius_m = norm(orbits_.r[kSelf]);
+  const double sine = std::fmax(dot(line_of_sight, orbits_.r[kSelf]) / radius_m, 0.0);
+  const double q = std::sqrt(sine * sine + 0.076);
+  const double slope = 2.037 / ((q + sine) * q) * std::sqrt(1.0 - sine * sine);
+  const double angle_rad = norm(orbits_.r[kOther] - orbits_.r[kSelf]) / radius_m;
+  return options_.ionosphere_m * slope * angle_rad;
 }
 
 void FormationFilter::judge(const UpdateReport& report, const Differences& all) {
