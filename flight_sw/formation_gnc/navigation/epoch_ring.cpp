@@ -11,7 +11,7 @@ int EpochRing::last_until(std::int64_t t_ns) const {
 int EpochRing::insert(std::int64_t t_ns, int depth) {
   int at = last_until(t_ns) + 1;
   if (count_ >= depth) {
-    if (at == 0) return -1;
+    if (at <= 1) return -1;  // nothing would be left behind it to start from
     const int freed = order_[0];
     for (int k = 1; k < count_; ++k) order_[k - 1] = order_[k];
     order_[count_ - 1] = freed;

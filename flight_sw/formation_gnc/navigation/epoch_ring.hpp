@@ -27,7 +27,7 @@ class EpochRing {
   /// Index of the latest entry not after t, or -1.
   int last_until(std::int64_t t_ns) const;
   /// A blank entry at its place in time. With `depth` there already, the oldest goes.
-  /// @return its index, or -1 if it would be the oldest of a full ring.
+  /// @return its index, or -1 if it would become the oldest of a full ring.
   int insert(std::int64_t t_ns, int depth);
   void clear() { count_ = 0; }
 

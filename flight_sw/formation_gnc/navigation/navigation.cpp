@@ -79,64 +79,82 @@ bool Navigation::accept_time(Who who, std::int64_t t_ns) {
   return true;
 }
 
+/// Where an epoch belongs.
+struct Navigation::Place {
+  int until = -1;        // latest entry not after it, or -1
+  bool known = false;    // that entry has its time
+  bool awaited = false;  // it is the companion's part of the epoch at which the filter stands
+  bool late = false;     // the filter has passed it otherwise
+};
+
+Navigation::Place Navigation::place_of(bool own, std::int64_t t_ns) const {
+  Place p;
+  p.until = ring_.last_until(t_ns);
+  p.known = p.until >= 0 && ring_[p.until].t_ns == t_ns;
+  p.awaited = p.known && !own && processed_ == p.until + 1;
+  p.late = !p.awaited && processed_ > (p.known ? p.until : p.until + 1);
+  return p;
+}
+
+// Can the filter go back behind the last entry, or part of one, that stays as it is? Before the
+// first one only if it had not started there.
+bool Navigation::may_take(bool own, const Place& place) const {
+  if (!place.late) return true;
+  if (!own && options_.late != LatePolicy::kRewindReplay) return false;
+  const int kept = place.known && own ? place.until - 1 : place.until;
+  return kept >= 0 || !ring_[0].after_own.started();
+}
+
+int Navigation::make_entry(std::int64_t t_ns) {
+  const bool full = ring_.count() >= options_.replay_depth;
+  const int at = ring_.insert(t_ns, options_.replay_depth);
+  if (at >= 0 && full && processed_ > 0) --processed_;
+  return at;
+}
+
 void Navigation::insert(Who who, const GnssEpoch& epoch, const Quaternion& q_BI) {
+  const bool own = who == Who::kSelf;
   if (!is_plausible(epoch) || !is_plausible(q_BI) || !accept_time(who, epoch.t_ns)) {
     ++statistics_.dropped;
     return;
   }
-  const bool own = who == Who::kSelf;
-  int at = ring_.last_until(epoch.t_ns);
-  const bool known = at >= 0 && ring_[at].t_ns == epoch.t_ns;
-  if (known && (own ? ring_[at].has_own : ring_[at].has_remote)) {
+  const Place place = place_of(own, epoch.t_ns);
+  if (place.known && (own ? ring_[place.until].has_own : ring_[place.until].has_remote)) {
     ++statistics_.duplicates;
     return;
   }
-  // Can the filter go back to where it takes this in? Behind entry `at` it can; for an own epoch
-  // of an entry that is there already, behind the one before.
-  const int behind = known && own ? at - 1 : at;
-  const bool late = behind < processed_ - 1 || (known && processed_ > at);
-  const bool by_policy = options_.late == LatePolicy::kRewindReplay || own ||
-                         (options_.late == LatePolicy::kDiscard && known && at == processed_ - 1 &&
-                          at == ring_.count() - 1);
-  if (late && (behind < 0 || !by_policy)) {
+  int at = -1;
+  if (may_take(own, place)) at = place.known ? place.until : make_entry(epoch.t_ns);
+  if (at < 0) {
     ++statistics_.dropped;
     return;
-  }
-  if (late && (known ? at < ring_.count() - 1 || own : true)) ++statistics_.late;
-  int restart = behind + 1;
-  if (!known) {
-    const int before = ring_.count();
-    at = ring_.insert(epoch.t_ns, options_.replay_depth);
-    if (at < 0) {
-      ++statistics_.dropped;
-      return;
-    }
-    if (ring_.count() == before && processed_ > 0) --processed_;
-    restart = at;
   }
   EpochEntry& entry = ring_[at];
   (own ? entry.has_own : entry.has_remote) = true;
   (own ? entry.own : entry.remote) = epoch;
   (own ? entry.q_own : entry.q_remote) = q_BI;
   ++(own ? statistics_.own_epochs : statistics_.remote_epochs);
-
-  if (known && !own && processed_ == at + 1) {
-    remote_phase(entry);  // the filter stands just there
-  } else if (known && !own && processed_ > at) {
-    rewind_behind(at);
-    process_from(at + 1);
-  } else {
-    if (processed_ > restart) rewind_behind(restart - 1);
-    process_from(processed_);
+  if (place.awaited) {
+    remote_phase(entry);
+    return;
   }
+  if (place.late) {
+    ++statistics_.late;
+    rewind_behind(place.known && !own ? at : at - 1);
+  }
+  process_from(processed_);
 }
 
 // From the snapshot that was taken before the companion's part of entry k.
 void Navigation::rewind_behind(int k) {
   ++statistics_.replays;
+  processed_ = k + 1;
+  if (k < 0) {
+    filter_ = FormationFilter(options_.filter);
+    return;
+  }
   filter_ = ring_[k].after_own;
   remote_phase(ring_[k]);
-  processed_ = k + 1;
 }
 
 void Navigation::process_from(int first) {

@@ -101,9 +101,13 @@ class Navigation {
   FormationEstimate told_by(const FormationFilter& filter) const;
   void insert(Who who, const GnssEpoch& epoch, const Quaternion& q_BI);
   bool accept_time(Who who, std::int64_t t_ns);
+  struct Place;
+  Place place_of(bool own, std::int64_t t_ns) const;
+  bool may_take(bool own, const Place& place) const;
+  int make_entry(std::int64_t t_ns);
   /// Works off entries from `first` on, the filter standing behind the one before.
   void process_from(int first);
-  /// Puts the filter behind entry k, companion's measurements included.
+  /// Puts the filter behind entry k, companion's measurements included; k = -1: not started.
   void rewind_behind(int k);
   void own_phase(EpochEntry* entry);
   void remote_phase(const EpochEntry& entry);

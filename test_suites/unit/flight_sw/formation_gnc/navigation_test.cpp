@@ -422,9 +422,10 @@ TEST_F(NavigationTest, LateReorderedAndDoubleEpochsGiveTheBitsOfOrder) {
     std::vector<Event> events;
     for (std::size_t k = 0; k < recording().size(); ++k) {
       const double at = static_cast<double>(k);
-      events.push_back({k < 3 ? at : at + random.uniform(0, 3), k, true});
+      events.push_back(
+          {k < 3 ? at : at + random.uniform(0, 3), k, true});  // the start is the first's
       for (int copy = 0; copy < 2; ++copy) {
-        events.push_back({k < 3 ? at + 0.5 : at + random.uniform(0, 15), k, false});
+        events.push_back({at + random.uniform(0, 15), k, false});
       }
     }
     std::stable_sort(events.begin(), events.end(),
@@ -471,8 +472,13 @@ TEST_F(NavigationTest, OlderThanTheRingIsDropped) {
   give_remote(recording()[2], &navigation);
   EXPECT_EQ(navigation.statistics().dropped, 1u);
   EXPECT_FALSE(navigation.filter().other_started());
+  // Between the two oldest of a full ring: that would push out the one to start from.
+  Epoch between = recording()[5];
+  between.measured[1]->t_ns += 5'000'000'000;
+  give_remote(between, &navigation);
+  EXPECT_EQ(navigation.statistics().dropped, 2u);
   give_remote(recording()[6], &navigation);
-  EXPECT_EQ(navigation.statistics().dropped, 1u);
+  EXPECT_EQ(navigation.statistics().dropped, 2u);
   EXPECT_TRUE(navigation.filter().other_started());
 }
 
