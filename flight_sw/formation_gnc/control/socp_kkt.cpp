@@ -11,9 +11,9 @@ using ByColumns = Eigen::SparseMatrix<double>;
 using ByRows = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
 // Of the equilibrated problem, whose entries are about 1.
-constexpr double kRegularisation = 1e-11;
-constexpr double kPivotOfDiagonal = 1e-14;
-constexpr int kRefinements = 3;
+constexpr double kRegularisation = 1e-8;
+constexpr double kPivotOfDiagonal = 1e-13;
+constexpr int kRefinements = 10;
 constexpr double kRefined = 1e-12;
 
 // Regularises and factors in place. Right-looking: every entry sees the same operations in the same

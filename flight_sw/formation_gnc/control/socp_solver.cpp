@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "formation_gnc/control/cone_product.hpp"
+#include "formation_gnc/control/socp_consistency.hpp"
 #include "formation_gnc/control/socp_equilibration.hpp"
 #include "formation_gnc/control/socp_kkt.hpp"
 
@@ -352,7 +353,13 @@ SocpSolution SocpSolver::solve(const SparseSocp& problem) const {
   const ConeProduct cones(problem.orthant, problem.cones);
   ConeProgram program;
   const Equilibration equilibration(problem, cones, &program);
-  InteriorPoint(program, cones, options_).run(&solution);
+  if (find_contradiction(program, &solution.y)) {
+    solution.status = SocpStatus::kPrimalInfeasible;
+    solution.x = Eigen::VectorXd::Zero(problem.c.size());
+    solution.s = solution.z = Eigen::VectorXd::Zero(problem.h.size());
+  } else {
+    InteriorPoint(program, cones, options_).run(&solution);
+  }
   equilibration.unscale(&solution);
   normalise_certificate(problem, &solution);
   measure(problem, &solution);

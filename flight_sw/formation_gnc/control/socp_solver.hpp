@@ -17,8 +17,8 @@
 ///             manoeuvre split into N impulses has N blocks of 4, so time and memory grow as N;
 ///             with a dense G there is one block, and they grow as N^3 and N^2.
 /// Accuracy    Relative residuals and duality gap below `tolerance`, of the equilibrated problem.
-///             Columns of [A; G] should be independent; rows of A that depend on others are
-///             tolerated where they are consistent.
+///             Columns of [A; G] should be independent. Rows of A that depend on others (to 1e-6 of
+///             their length) are tolerated where b agrees, and a contradiction where it does not.
 /// Memory      1.4 kB per impulse of such a plan; all of it is released on return, but the
 /// solution. Errors      No exceptions of its own; std::bad_alloc where memory is short. Checked by
 /// test_suites/unit/flight_sw/formation_gnc/socp_solver_test.cpp
