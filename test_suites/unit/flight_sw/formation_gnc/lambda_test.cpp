@@ -92,7 +92,7 @@ std::vector<double> two_least_by_brute_force(const Problem& p, int reach) {
   return all;
 }
 
-// 150 problems of 2 to 4 differences. The ellipsoids are at most 2.5 cycles long, so 7 on each side hold
+// 150 problems of 2 to 4 differences. The ellipsoids are at most 2.5 cycles long, so 7 on each side
 // hold the two best for sure.
 TEST(LambdaTest, EqualsBruteForce) {
   orrery::RandomStream random(1);

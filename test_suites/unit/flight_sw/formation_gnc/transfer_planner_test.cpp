@@ -108,7 +108,7 @@ TEST_F(TransferPlannerTest, ScienceOrbitIsTheOneOfTheGuide) {
 
 // The guide gives 0.326 m/s for bound_sep, n a (|ddi| + |dde|/2), of changes by 198.5 m; here they
 // are 204.4 and 205.6 m, which makes 0.337. Burns of 3 mm/s spread over arcs of 15 deg to each side
-// of the phase, on average 1 % less than at it. Observed 0.2552 m/s, between joint 0.2522 and 1.2 *
+// of the phase, on average 1 % less than at it. Observed 0.2553 m/s, between joint 0.2519 and 1.2 *
 // 0.3369, with 89 burns.
 TEST_F(TransferPlannerTest, StandbyToScienceCostsWhatItMust) {
   const TransferPlan planned = plan();
@@ -136,13 +136,16 @@ TEST_F(TransferPlannerTest, StandbyToScienceArrivesAboveAnOblateEarth) {
   flown.fly(planned.burns);
   flown.coast_to(goal.end_ns);
   const RelativeElements found = flown.a_roe();
+  for (int k = 0; k < 6; ++k) {
+    RecordProperty("miss_" + std::to_string(k), std::to_string(found[k] - goal.a_roe[k]));
+  }
   EXPECT_NEAR(found[kDa], goal.a_roe[kDa], 0.05);
   EXPECT_NEAR(found[kDl], goal.a_roe[kDl], 3.0);
   for (int k = kDex; k <= kDiy; ++k) EXPECT_NEAR(found[k], goal.a_roe[k], 0.4) << k;
 }
 
 // Radial and cross-track distance on the way, sampled in the Cartesian truth: never below what the
-// plan says of itself, which counts lost burns, too. Observed 18.4 m, said 16.0 m; the science
+// plan says of itself, which counts lost burns, too. Observed 18.5 m, said 16.2 m; the science
 // orbit itself has 27.0 m, and a*da of 8 m at the end of an arc takes its part of that.
 TEST_F(TransferPlannerTest, StandbyToScienceKeepsItsDistance) {
   const TransferPlan planned = plan();
@@ -161,6 +164,7 @@ TEST_F(TransferPlannerTest, StandbyToScienceKeepsItsDistance) {
     const Vec3 r = relative_state_rtn(flown.chief, flown.deputy).r_DC_RTN;
     least_m = std::fmin(least_m, std::hypot(r[0], r[2]));
   }
+  RecordProperty("least_m", std::to_string(least_m));
   EXPECT_GT(least_m, planned.safe_distance_m - 0.2) << planned.safe_distance_m;
 }
 
@@ -180,8 +184,49 @@ TEST_F(TransferPlannerTest, StandbyToScienceKeepsVectorsParallel) {
         std::atan2(at.a_roe[kDey], at.a_roe[kDex]) - std::atan2(at.a_roe[kDiy], at.a_roe[kDix]);
     worst_rad = std::fmax(worst_rad, std::fabs(wrap_pi(apart_rad)));
   }
-  // Across the phase the vectors shrink to 28 m, and a burn moves them by 2.5 m.
-  EXPECT_LT(worst_rad, 10.0 * kDegree_rad) << worst_rad / kDegree_rad;
+  // Near the end a burn moves vectors of 28 m by 2.5 m; along them, but for the arc. Observed 2.1
+  // deg.
+  RecordProperty("worst_deg", std::to_string(worst_rad / kDegree_rad));
+  EXPECT_LT(worst_rad, 5.0 * kDegree_rad) << worst_rad / kDegree_rad;
+}
+
+// The loop closed: ROE 5 m off (1 sigma; a*da 0.3 m, or the drift alone would be 200 m), a thruster
+// with its errors, planned anew every two hours and at last half an orbit before the end. What is
+// left at the observation is for the trims, which take 1 m easily. Observed 0.275 m/s on average.
+TEST_F(TransferPlannerTest, PlanningAnewTakesOutDispersions) {
+  const DeltaVBounds bounds = delta_v_bounds(start, goal, options);
+  const Vec3 sun = sun_direction_EME2000(goal.end_ns);
+  const int seeds = 5;
+  double sum_mps = 0.0;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    flight_test::Noise noise(static_cast<std::uint64_t>(seed));
+    const double scale = 1.0 + 0.02 * noise.normal();
+    const Vec3 tilt = noise.normal3(8.7e-3);
+    RelativeOrbit orbit = start.orbit;
+    for (int k = 0; k < 6; ++k) orbit.a_roe[k] += (k == kDa ? 0.3 : 5.0) * noise.normal();
+    Flown flown(orbit);
+    while (flown.t_ns < options.last_ns - 600 * kSecond_ns) {
+      TransferStart now;
+      now.orbit = {flown.t_ns, flight_test::mean_of_state(flown.chief), flown.a_roe()};
+      const TransferPlan planned = ReconfigurationPlanner(options).plan(now, goal);
+      ASSERT_EQ(planned.status, PlanStatus::kPlanned) << seed << to_string(planned.status);
+      const double left_s = seconds(options.last_ns - flown.t_ns);
+      const std::int64_t until_ns =
+          std::min(options.last_ns, flown.t_ns + (left_s < 9000.0 ? 2870 : 7200) * kSecond_ns);
+      for (const Burn& burn : planned.burns) {
+        if (burn.t_ns > until_ns) break;
+        const double size = scale * (1.0 + 0.01 * noise.normal());
+        sum_mps += size * norm(burn.dv_RTN);
+        flown.fly({{burn.t_ns, size * (burn.dv_RTN + cross(tilt, burn.dv_RTN))}});
+      }
+      flown.coast_to(until_ns);
+    }
+    flown.coast_to(goal.end_ns);
+    EXPECT_LT(norm(flown.deputy.r_ECI - flown.chief.r_ECI - 40.0 * sun), 3.0) << seed;
+  }
+  RecordProperty("mean_mps", std::to_string(sum_mps / seeds));
+  EXPECT_GE(sum_mps / seeds, bounds.joint_mps);
+  EXPECT_LE(sum_mps / seeds, 1.2 * 0.326);
 }
 
 TEST_F(TransferPlannerTest, FallbackArrivesToo) {
@@ -190,7 +235,7 @@ TEST_F(TransferPlannerTest, FallbackArrivesToo) {
   ASSERT_EQ(planned.status, PlanStatus::kFallback) << to_string(planned.status);
   const DeltaVBounds bounds = delta_v_bounds(start, goal, options);
   EXPECT_GE(planned.delta_v_mps, bounds.joint_mps * (1.0 - 1e-6));
-  EXPECT_LE(planned.delta_v_mps, 1.2 * bounds.separate_mps);  // observed 0.2575 m/s
+  EXPECT_LE(planned.delta_v_mps, 1.2 * bounds.separate_mps);  // observed 0.2576 m/s
   expect_within_limits(planned);
   for (int k = 0; k < 6; ++k) EXPECT_NEAR(planned.miss[k], 0.0, 0.05) << k;
 }
