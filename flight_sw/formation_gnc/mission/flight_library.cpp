@@ -1,5 +1,13 @@
 // The class behind the flight ABI: ports in, ports out, one instance per spacecraft.
+//
+// Built once more for each of two defects that packages of this kind have had (Bell & D'Amico), so
+// that regression tests can show what catches them:
+//   FORMATION_GNC_DEFECT_NO_RETRANSMISSION  transitions are sent once and not waited for; the
+//   passive
+//                                           side takes it that it knows of each
+//   FORMATION_GNC_DEFECT_ORDERED_QUEUE      measurements are taken to arrive in the order sent
 
+#include <cassert>
 #include <cstring>
 
 #include "formation_gnc/mission/formation_gnc.hpp"
@@ -39,6 +47,10 @@ Configuration configuration_of(const orrery_boot& boot) {
   char message[192];
   parse_configuration(static_cast<const char*>(boot.config), boot.config_bytes, boot.spacecraft,
                       &configuration, message, sizeof message);
+#ifdef FORMATION_GNC_DEFECT_NO_RETRANSMISSION
+  configuration.link.retransmit = false;
+  configuration.mission.transition.await_acknowledgement = false;
+#endif
   return configuration;
 }
 
@@ -106,6 +118,8 @@ class Library {
     return status(gnc_.in_bus(now_ns, data_of(bytes), bytes.size));
   }
   std::int32_t crosslink(std::int64_t now_ns, Bytes bytes) {
+    expect_order(bytes);
+    expect_known(now_ns);
     return status(gnc_.in_crosslink(now_ns, data_of(bytes), bytes.size));
   }
   std::int32_t command(std::int64_t now_ns, Bytes bytes) {
@@ -118,6 +132,36 @@ class Library {
   static const Port (&ports())[11];
 
  private:
+#ifdef FORMATION_GNC_DEFECT_ORDERED_QUEUE
+  void expect_order(Bytes bytes) {
+    formation_gnc_header header;
+    formation_gnc_measurement m;
+    const unsigned char* packet = data_of(bytes);
+    if (formation_gnc_get_packet(packet, bytes.size, &header) == 0 ||
+        formation_gnc_get_measurement(packet + FORMATION_GNC_HEADER_BYTES, header.body_bytes, &m) ==
+            0) {
+      return;
+    }
+    assert(m.t_ns > newest_ns_);
+    newest_ns_ = m.t_ns;
+  }
+  std::int64_t newest_ns_ = 0;
+#else
+  void expect_order(Bytes) {}
+#endif
+#ifdef FORMATION_GNC_DEFECT_NO_RETRANSMISSION
+  // An announcement may be overtaken; a minute after the commitment it should be there.
+  void expect_known(std::int64_t now_ns) {
+    const TransitionRecord& record = gnc_.mission().protocol().record();
+    const std::uint32_t known = record.has_pending ? record.pending.id : record.executed_id;
+    if (record.committed_id <= known) unknown_since_ns_ = now_ns;
+    assert(now_ns - unknown_since_ns_ < INT64_C(60000000000));
+  }
+  std::int64_t unknown_since_ns_ = 0;
+#else
+  void expect_known(std::int64_t) {}
+#endif
+
   HostOutputs outputs_;
   FormationGnc gnc_;
 };

@@ -175,7 +175,9 @@ void TransitionProtocol::poll(std::int64_t now_ns, ReliableLink* link) {
 
 void TransitionProtocol::decide(std::int64_t now_ns, const ReliableLink& link) {
   if (!record_.has_pending || is_committed()) return;
-  if (announced_ && link.delivered() >= announcement_mark_ && now_ns < record_.pending.begin_ns) {
+  const bool acknowledged = link.delivered() >= announcement_mark_;
+  if (announced_ && (acknowledged || !options_.await_acknowledgement) &&
+      now_ns < record_.pending.begin_ns) {
     record_.committed_id = record_.pending.id;
     change();
     return;

@@ -32,7 +32,8 @@ struct TransitionOptions {
   double lead_s = 900.0;  ///< of announcements of mode changes, above guard_s
   /// Longer than the crosslink's longest usual silence, 5 min in the reference mission.
   double guard_s = 360.0;
-  double late_s = 2.0;  ///< an execution later than this counts as late
+  double late_s = 2.0;                ///< an execution later than this counts as late
+  bool await_acknowledgement = true;  ///< false: the leader commits blindly; a defect
 };
 
 /// What must survive a restart.
