@@ -21,6 +21,7 @@ enum PayloadType : unsigned { kForwardedCommand = 16, kManeuverNotice = 17 };
 
 constexpr std::int64_t kNs = 1000000000;
 constexpr std::int64_t kForecastPeriod_ns = 60 * kNs;
+constexpr std::int64_t kEpochSilence_ns = 50 * kNs;
 constexpr std::int64_t kReceiverSilence_ns = 60 * kNs;
 constexpr std::int64_t kHousekeeping_ns = 60 * kNs;
 constexpr std::int64_t kRetry_ns = kNs;
@@ -171,7 +172,7 @@ bool FormationGnc::in_crosslink(std::int64_t now_onboard_ns, const unsigned char
   }
   Payload payload;
   while (crosslink_.link().take(&payload)) good = take_payload(payload, now_ns) && good;
-  work(now_onboard_ns);
+  work_blindly(now_onboard_ns);
   return good || reject();
 }
 
@@ -221,7 +222,7 @@ bool FormationGnc::in_command(std::int64_t now_onboard_ns, const unsigned char* 
       return reject();
     }
   }
-  work(now_onboard_ns);
+  work_blindly(now_onboard_ns);
   return true;
 }
 
@@ -235,13 +236,14 @@ bool FormationGnc::take_command(const unsigned char* message, std::uint32_t byte
 }
 
 void FormationGnc::in_tick(std::int64_t now_ns) {
-  work(now_ns);
+  work_blindly(now_ns);
 }
 
 // ---- epochs
 
 void FormationGnc::handle_epoch(const GnssEpoch& epoch, std::int64_t now_onboard_ns) {
   clock_.compare(epoch.t_ns, now_onboard_ns);
+  last_epoch_ns_ = epoch.t_ns;
   const std::int64_t now_ns = clock_.gps_ns(now_onboard_ns);
   if (epoch.count > 0) last_range_ns_ = epoch.t_ns;
   if (attitude_.t_ns != 0) {
@@ -262,7 +264,7 @@ void FormationGnc::handle_epoch(const GnssEpoch& epoch, std::int64_t now_onboard
     last_telemetry_slot_ = slot;
     send_telemetry(now_ns, estimate);
   }
-  work(now_onboard_ns);
+  work(now_onboard_ns, estimate.valid ? &estimate : nullptr);
 }
 
 Quaternion FormationGnc::attitude_at(std::int64_t t_ns) const {
@@ -281,23 +283,34 @@ void FormationGnc::send_measurement(const GnssEpoch& epoch, const Quaternion& q_
 
 // ---- decisions
 
-// After every input: faults, plan, protocol, storage, manoeuvres, then what is to be said. Stored
-// before it is said: what the partner hears of is never forgotten.
-void FormationGnc::work(std::int64_t now_onboard_ns) {
+// Estimates are asked for at epochs, where they are published anyway, and on ticks when the
+// receiver is silent: a packet in between changes nothing that would not wait for the next epoch.
+void FormationGnc::work_blindly(std::int64_t now_onboard_ns) {
   const std::int64_t now_ns = clock_.gps_ns(now_onboard_ns);
-  if (now_ns - std::max(last_range_ns_, asked_ns_) > kReceiverSilence_ns) ask_receiver(now_ns);
+  if (now_ns - last_epoch_ns_ < kEpochSilence_ns) {
+    work(now_onboard_ns, nullptr);
+    return;
+  }
   const FormationEstimate estimate = navigation_.at(now_ns);
   navigation_valid_ = estimate.valid;
-  if (estimate.valid) watch_separation(estimate);
+  work(now_onboard_ns, estimate.valid ? &estimate : nullptr);
+}
+
+// After every input: faults, plan, protocol, storage, manoeuvres, then what is to be said. Stored
+// before it is said: what the partner hears of is never forgotten.
+void FormationGnc::work(std::int64_t now_onboard_ns, const FormationEstimate* estimate) {
+  const std::int64_t now_ns = clock_.gps_ns(now_onboard_ns);
+  if (now_ns - std::max(last_range_ns_, asked_ns_) > kReceiverSilence_ns) ask_receiver(now_ns);
+  if (estimate != nullptr) watch_separation(*estimate);
   mission_.watch(now_ns,
                  {navigation_valid_,
                   is_deputy() && configuration_.escape && unsafe_forecasts_ >= kUnsafeForecasts,
                   partner_heard_ns_, delta_v_mps_});
   settle(now_ns);
-  if (estimate.valid) place_observation(estimate);
+  if (estimate != nullptr) place_observation(*estimate);
   mission_.poll(now_ns, &crosslink_.link());
   settle(now_ns);
-  if (is_deputy() && estimate.valid) maneuver(estimate);
+  if (is_deputy() && estimate != nullptr) maneuver(*estimate);
   learn_scale(now_ns);
   send_due(now_onboard_ns);
   schedule(now_ns, now_onboard_ns);
@@ -364,7 +377,8 @@ Situation FormationGnc::situation(const FormationEstimate& estimate) const {
 
 // A forecast that is not based on anything yet must not lead to an escape.
 void FormationGnc::watch_separation(const FormationEstimate& estimate) {
-  if (estimate.t_ns / kForecastPeriod_ns == last_forecast_slot_) return;
+  // Every minute; after one that looks unsafe at the next epoch, so that two more soon decide.
+  if (estimate.t_ns / kForecastPeriod_ns == last_forecast_slot_ && unsafe_forecasts_ == 0) return;
   last_forecast_slot_ = estimate.t_ns / kForecastPeriod_ns;
   const Situation s = situation(estimate);
   if (!(s.sigma_r_m < configuration_.maneuvers.planning_sigma_r_m)) return;
@@ -385,12 +399,12 @@ void FormationGnc::place_observation(const FormationEstimate& estimate) {
 
 void FormationGnc::maneuver(const FormationEstimate& estimate) {
   Impulse wanted;
-  if (maneuvers_.next(situation(estimate), &wanted)) command_burn(wanted, estimate);
+  if (maneuvers_.next(situation(estimate), &wanted)) command_burn(wanted);
   const char* trouble = maneuvers_.trouble();
   if (trouble != nullptr) say(LogLevel::kWarning, "no usable plan: %s", trouble);
 }
 
-void FormationGnc::command_burn(const Impulse& wanted, const FormationEstimate&) {
+void FormationGnc::command_burn(const Impulse& wanted) {
   const Vec3 commanded = scale_.command_for(wanted.dv_ECI);
   const double dv[3] = {commanded[0], commanded[1], commanded[2]};
   const bool accepted = out_.out_maneuver(clock_.onboard_ns(wanted.t_ns), dv);

@@ -103,14 +103,15 @@ class FormationGnc {
   bool take_command(const unsigned char* message, std::uint32_t bytes);
   bool take_maneuver(const Payload& payload);
 
-  void work(std::int64_t now_onboard_ns);
+  void work_blindly(std::int64_t now_onboard_ns);
+  void work(std::int64_t now_onboard_ns, const FormationEstimate* estimate);
   void settle(std::int64_t now_ns);
   void execute(const TransitionProtocol::Execution& execution, std::int64_t now_ns);
   void save();
   void watch_separation(const FormationEstimate& estimate);
   void place_observation(const FormationEstimate& estimate);
   void maneuver(const FormationEstimate& estimate);
-  void command_burn(const Impulse& wanted, const FormationEstimate& estimate);
+  void command_burn(const Impulse& wanted);
   void watch_burn(const Impulse& wanted);
   void learn_scale(std::int64_t now_ns);
   void send_due(std::int64_t now_ns);
@@ -138,6 +139,7 @@ class FormationGnc {
   SeparationForecast forecast_;
 
   std::int64_t boot_ns_;
+  std::int64_t last_epoch_ns_ = 0;
   std::int64_t last_range_ns_ = 0;  // GPS; of the receiver's epochs with observations
   std::int64_t asked_ns_ = 0;
   std::int64_t last_crosslink_slot_ = -1, last_telemetry_slot_ = -1, last_forecast_slot_ = -1;

@@ -53,6 +53,12 @@ std::int64_t ManeuverManager::earliest_ns(const Situation& now) const {
                   after(last_burn_ns_, options_.limits.spacing_s));
 }
 
+// With the least lead the thruster takes.
+std::int64_t ManeuverManager::soonest_ns(const Situation& now) const {
+  return std::max(after(now.t_ns, options_.least_lead_s + 5.0),
+                  after(last_burn_ns_, options_.limits.spacing_s));
+}
+
 std::int64_t ManeuverManager::next_observation_ns(const Situation& now,
                                                   std::int64_t after_ns) const {
   const OrbitElements chief = mean_from_osculating(osculating_from_state(now.chief));
@@ -81,7 +87,7 @@ bool ManeuverManager::next(const Situation& now, Impulse* wanted) {
     case Mode::kEscape:
       if (!planned_) {
         plan_ = SeparationMonitor().escape(
-            {now.t_ns, now.chief, now.deputy, now.relative_covariance_RTN}, earliest_ns(now));
+            {now.t_ns, now.chief, now.deputy, now.relative_covariance_RTN}, soonest_ns(now));
         next_burn_ = 0;
         planned_ = true;
         ++plans_;
@@ -160,8 +166,7 @@ bool ManeuverManager::next_of_plan(const Situation& now, Impulse* wanted) {
 
 bool ManeuverManager::align(const Situation& now, Impulse* wanted) {
   if (now.sigma_r_m > options_.alignment_sigma_r_m || now.t_ns < realign_ns_) return false;
-  const std::int64_t earliest = std::max(after(now.t_ns, options_.least_lead_s + 5.0),
-                                         after(last_burn_ns_, options_.limits.spacing_s));
+  const std::int64_t earliest = soonest_ns(now);
   if (earliest > after(observation_ns_, -options_.last_trim_s)) return false;
   AlignmentOptions options;
   options.separation_m = options_.separation_m;

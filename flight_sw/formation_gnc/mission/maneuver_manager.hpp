@@ -72,6 +72,7 @@ class ManeuverManager {
   bool align(const Situation& now, Impulse* wanted);
   bool next_of_plan(const Situation& now, Impulse* wanted);
   std::int64_t earliest_ns(const Situation& now) const;
+  std::int64_t soonest_ns(const Situation& now) const;
   flight_support::RelativeElements science_goal(const Situation& now,
                                                 std::int64_t observation_ns) const;
 
