@@ -9,39 +9,16 @@
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
+#include <functional>
 #include <stdio_ext.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 namespace orrery::internal {
 namespace {
 
-constexpr int kFirst = 512, kEnd = 1024;
-constexpr std::size_t kLongestPath = 1024;
-constexpr std::int64_t kHere = -1;  // at the file's own offset
-
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define ORRERY_SANITIZER_OPENS_FILES
-#endif
-#endif
-#if defined(__SANITIZE_ADDRESS__)
-#define ORRERY_SANITIZER_OPENS_FILES
-#endif
-// To print where an error was, a sanitizer opens files from within flight code.
-#ifdef ORRERY_SANITIZER_OPENS_FILES
-constexpr bool kCanRefuse = false;
-#else
-constexpr bool kCanRefuse = true;
-#endif
-
-// As flight code. False: too long.
-bool copy_path(char (&to)[kLongestPath], const char* path) {
-  const std::size_t length = strnlen(path, kLongestPath);
-  if (length == kLongestPath) return false;
-  copy_between(to, path, length);
-  to[length] = 0;
-  return true;
-}
+constexpr int kFirst = 512, kEnd = 1024;  // descriptors
+constexpr std::int64_t kHere = -1;        // at the file's own offset
 
 // -1: no mode of fopen.
 int flags_of(const char* mode) {
@@ -123,14 +100,15 @@ FileServices::~FileServices() {
 
 void FileServices::flush() {
   for (int fd = kFirst; fd < kEnd; ++fd) {  // not by an iterator: flight code may close
-    const OpenFile* file = find(fd);
-    if (file != nullptr && file->stream != nullptr) std::fflush(file->stream->file);
+    const auto found = open_.find(fd);
+    if (found == open_.end() || found->second.stream == nullptr) continue;
+    std::fflush(found->second.stream->file);
   }
 }
 
 void FileServices::close_all() {
-  for (auto& [fd, file] : open_) {
-    if (file.stream != nullptr) orphans_.push_back(std::move(file.stream));
+  for (auto& [fd, descriptor] : open_) {
+    if (descriptor.stream != nullptr) orphans_.push_back(std::move(descriptor.stream));
   }
   for (const std::shared_ptr<Stream>& stream : orphans_) {
     stream->services = nullptr;
@@ -140,172 +118,38 @@ void FileServices::close_all() {
   }
   orphans_.clear();
   open_.clear();
+  for (const Mapping& mapping : mappings_) munmap(mapping.begin, mapping.bytes);
+  mappings_.clear();
 }
 
 FileServices::OpenFile* FileServices::find(int fd) {
   const auto found = open_.find(fd);
-  return found == open_.end() ? nullptr : &found->second;
+  return found == open_.end() ? nullptr : found->second.file.get();
 }
 
-// ---- paths
-
-FileServices::Place FileServices::place_of(int folder, const char* text, std::string& path) const {
-  std::string from = "/";
-  if (text[0] != '/' && folder != AT_FDCWD) {
-    const auto base = open_.find(folder);
-    if (base == open_.end()) return Place::kHost;
-    from = base->second.path;
-  }
-  path = FlightFiles::normal(from, text);
-  if (memory_->files.covers(path)) return Place::kOurs;
-  // A folder above one of ours: it is there, with nothing in it but the way to ours.
-  if (memory_->files.find(path) != nullptr && options_.other_files != OtherFiles::kHost) {
-    return Place::kOurs;
-  }
-  switch (options_.other_files) {
-    case OtherFiles::kHost:
-      return Place::kHost;
-    case OtherFiles::kAbsent:
-      return Place::kAbsent;
-    case OtherFiles::kRefuse:
-      break;
-  }
-  return kCanRefuse ? Place::kRefused : Place::kHost;
-}
-
-// action(path), as simulator code, where the path is the spacecraft's.
-template <class Action>
-FileView::Result FileServices::at_path(const char* function, int folder, const char* given,
-                                       Action action) {
-  char text[kLongestPath];
-  if (!copy_path(text, given)) return -ENAMETOOLONG;
-  char refusal[192];
-  Place place = Place::kHost;
-  long result = 0;
-  {
-    const SimulatorScope scope;
-    std::string path;
-    place = place_of(folder, text, path);
-    if (place == Place::kOurs) result = action(path);
-    std::snprintf(refusal, sizeof refusal,
-                  "%s(\"%.100s\") called: no file of this spacecraft (FlightOptions::files)",
-                  function, text);
-  }
-  if (place == Place::kRefused) end_running_call(CrashKind::kForbiddenCall, refusal);
-  if (place == Place::kHost) return std::nullopt;
-  return place == Place::kOurs ? result : -ENOENT;
-}
-
-FileView::Result FileServices::open(const char* function, int folder, const char* path, int flags) {
-  return at_path(function, folder, path,
-                 [&](const std::string& full) { return open_node(full, flags); });
-}
-
-long FileServices::open_node(const std::string& path, int flags) {
-  const auto made = [&] { return files().make(path, false, clock_.unix_now_ns()); };
-  FlightFiles::NodePointer node = files().find(path);
-  const bool may_write = (flags & O_ACCMODE) != O_RDONLY;
-  if (node == nullptr) {
-    if ((flags & O_CREAT) == 0) return -ENOENT;
-    if (const int error = made()) return error;
-    node = files().find(path);
-  } else {
-    if ((flags & O_CREAT) != 0 && (flags & O_EXCL) != 0) return -EEXIST;
-    if (node->is_folder && may_write) return -EISDIR;
-    if (!node->is_folder && (flags & O_DIRECTORY) != 0) return -ENOTDIR;
-    if (may_write && (flags & O_TRUNC) != 0) files().resize(*node, 0, clock_.unix_now_ns());
-  }
-  int fd = kFirst;
+int FileServices::free_number(int at_least) const {
+  int fd = std::max(at_least, kFirst);
   while (fd < kEnd && open_.count(fd) != 0) ++fd;
-  if (fd == kEnd) return -EMFILE;
-  OpenFile& file = open_[fd];
-  file.node = node;
-  file.path = path;
-  file.flags = flags;
-  if (node->is_folder) file.names = files().names_in(path);
-  return fd;
+  return fd < kEnd ? fd : -EMFILE;
 }
 
-FileView::Result FileServices::resize(const char* function, const char* path, std::int64_t bytes) {
-  return at_path(function, AT_FDCWD, path, [&](const std::string& full) -> long {
-    const FlightFiles::NodePointer node = files().find(full);
-    if (node == nullptr) return -ENOENT;
-    if (node->is_folder) return -EISDIR;
-    return bytes < 0
-               ? -EINVAL
-               : files().resize(*node, static_cast<std::uint64_t>(bytes), clock_.unix_now_ns());
-  });
-}
-
-FileView::Result FileServices::status(const char* function, int folder, const char* path,
-                                      struct stat* to) {
-  struct stat found {};
-  const Result result = at_path(function, folder, path, [&](const std::string& full) -> long {
-    const FlightFiles::NodePointer node = files().find(full);
-    return node == nullptr ? -ENOENT : describe(*node, &found);
-  });
-  if (result == 0) copy_between(to, &found, sizeof found);
-  return result;
-}
-
-long FileServices::describe(const FlightFiles::Node& node, struct stat* to) const {
-  constexpr std::int64_t kSecond_ns = 1'000'000'000;
-  constexpr std::int64_t kBlock_bytes = 512;
-  *to = {};
-  to->st_ino = node.number;
-  to->st_nlink = 1;
-  to->st_mode = node.is_folder ? S_IFDIR | 0755 : S_IFREG | 0644;
-  to->st_size = static_cast<off_t>(node.content.size());
-  to->st_blksize = 4096;
-  to->st_blocks = (to->st_size + kBlock_bytes - 1) / kBlock_bytes;
-  to->st_mtim = {node.changed_unix_ns / kSecond_ns, node.changed_unix_ns % kSecond_ns};
-  to->st_atim = to->st_ctim = to->st_mtim;
-  return 0;
-}
-
-FileView::Result FileServices::access(const char* function, int folder, const char* path) {
-  return at_path(function, folder, path, [&](const std::string& full) -> long {
-    return files().find(full) == nullptr ? -ENOENT : 0;
-  });
-}
-
-FileView::Result FileServices::remove(const char* function, int folder, const char* path,
-                                      Kind kind) {
-  return at_path(function, folder, path, [&](const std::string& full) -> long {
-    const FlightFiles::NodePointer node = files().find(full);
-    const bool is_folder =
-        kind == Kind::kFolder || (kind == Kind::kEither && node != nullptr && node->is_folder);
-    return files().remove(full, is_folder);
-  });
-}
-
-FileView::Result FileServices::rename(const char* function, const char* from, const char* to) {
-  char text[kLongestPath];
-  if (!copy_path(text, to)) return -ENAMETOOLONG;
-  return at_path(function, AT_FDCWD, from, [&](const std::string& full) -> long {
-    std::string target;
-    if (place_of(AT_FDCWD, text, target) != Place::kOurs) return -EXDEV;
-    return files().rename(full, target);
-  });
-}
-
-FileView::Result FileServices::make_folder(const char* function, int folder, const char* path) {
-  return at_path(function, folder, path, [&](const std::string& full) -> long {
-    return files().make(full, true, clock_.unix_now_ns());
-  });
+// As a crash; where a sanitizer must go on, the error that the call returns.
+long FileServices::end_call(const char* refusal) {
+  if (kCanRefuse) end_running_call(CrashKind::kForbiddenCall, refusal);
+  return -EPERM;
 }
 
 // ---- descriptors
 
 FileView::Result FileServices::close(int fd) {
-  OpenFile* file = find(fd);
-  if (file == nullptr) return std::nullopt;
+  const auto found = open_.find(fd);
+  if (found == open_.end()) return std::nullopt;
   const SimulatorScope scope;
-  if (file->stream != nullptr) {
-    file->stream->services = nullptr;
-    orphans_.push_back(std::move(file->stream));
+  if (std::shared_ptr<Stream>& stream = found->second.stream) {
+    stream->services = nullptr;
+    orphans_.push_back(std::move(stream));
   }
-  open_.erase(fd);
+  open_.erase(found);
   return 0;
 }
 
@@ -402,6 +246,120 @@ FileView::Result FileServices::status(int fd, struct stat* to) {
   return 0;
 }
 
+// ---- copies of descriptors
+
+FileView::Result FileServices::duplicate(int fd, int at_least, bool closes_at_exec) {
+  if (find(fd) == nullptr) return std::nullopt;
+  const SimulatorScope scope;
+  const int copy = free_number(at_least);
+  if (copy >= 0) open_[copy] = {open_.at(fd).file, nullptr, closes_at_exec ? FD_CLOEXEC : 0};
+  return copy;
+}
+
+FileView::Result FileServices::duplicate_to(const char* function, int fd, int to) {
+  const bool is_ours = find(fd) != nullptr;
+  const bool takes_ours = to >= kFirst && to < kEnd;
+  if (!is_ours && !takes_ours) return std::nullopt;
+  if (is_ours && takes_ours) {
+    if (fd == to) return to;
+    close(to);
+    const SimulatorScope scope;
+    open_[to].file = open_.at(fd).file;
+    return to;
+  }
+  char refusal[160];
+  std::snprintf(refusal, sizeof refusal,
+                "%s(%d, %d) called: between a file of this spacecraft (descriptors %d to %d) and "
+                "one of the host",
+                function, fd, to, kFirst, kEnd - 1);
+  return end_call(refusal);
+}
+
+FileView::Result FileServices::control(int fd, int command, long argument) {
+  constexpr int kSettable = O_APPEND | O_NONBLOCK;
+  const auto found = open_.find(fd);
+  if (found == open_.end()) return std::nullopt;
+  OpenFile& file = *found->second.file;
+  switch (command) {
+    case F_DUPFD:
+    case F_DUPFD_CLOEXEC:
+      if (argument < 0 || argument >= kEnd) return -EINVAL;
+      return duplicate(fd, static_cast<int>(argument), command == F_DUPFD_CLOEXEC);
+    case F_GETFD:
+      return found->second.flags;
+    case F_SETFD:
+      found->second.flags = static_cast<int>(argument) & FD_CLOEXEC;
+      return 0;
+    case F_GETFL:
+      return file.flags & (O_ACCMODE | O_DSYNC | kSettable);
+    case F_SETFL:
+      file.flags = (file.flags & ~kSettable) | (static_cast<int>(argument) & kSettable);
+      return 0;
+    case F_SETLK:
+    case F_SETLKW:
+    case F_OFD_SETLK:
+    case F_OFD_SETLKW:
+      return 0;
+    case F_GETLK:
+    case F_OFD_GETLK: {
+      const decltype(flock::l_type) free = F_UNLCK;
+      copy_between(&reinterpret_cast<struct flock*>(argument)->l_type, &free, sizeof free);
+      return 0;
+    }
+    default:
+      return -EINVAL;
+  }
+}
+
+// ---- mappings
+
+FileView::Result FileServices::map(std::size_t bytes, int protection, int flags, int fd,
+                                   std::int64_t offset) {
+  OpenFile* file = find(fd);
+  if (file == nullptr) return std::nullopt;
+  const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+  if (file->node->is_folder) return -ENODEV;
+  if (!file->readable()) return -EACCES;
+  if (bytes == 0 || bytes > SIZE_MAX - page || offset < 0) return -EINVAL;
+  const auto from = static_cast<std::size_t>(offset);
+  if (from % page != 0) return -EINVAL;
+  if ((flags & MAP_TYPE) != MAP_PRIVATE || (flags & MAP_FIXED) != 0) {
+    char refusal[256];
+    std::snprintf(refusal, sizeof refusal,
+                  "mmap of \"%.100s\" called: a file of this spacecraft can be mapped MAP_PRIVATE "
+                  "and where there is room, not MAP_SHARED or MAP_FIXED",
+                  file->path.c_str());
+    return end_call(refusal);
+  }
+  const SimulatorScope scope;
+  const std::size_t whole = (bytes + page - 1) / page * page;
+  void* memory = mmap(nullptr, whole, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED) return -ENOMEM;
+  const ByteBuffer& content = file->node->content;
+  if (from < content.size()) {
+    std::memcpy(memory, content.data() + from, std::min(bytes, content.size() - from));
+  }
+  mprotect(memory, whole, protection);
+  mappings_.push_back({static_cast<std::byte*>(memory), whole});
+  return reinterpret_cast<std::intptr_t>(memory);
+}
+
+// Whole ones only.
+FileView::Result FileServices::unmap(void* address, std::size_t bytes) {
+  const auto* begin = static_cast<const std::byte*>(address);
+  const auto found =
+      std::find_if(mappings_.begin(), mappings_.end(), [begin, bytes](const Mapping& m) {
+        return std::less<>()(begin, m.begin + m.bytes) && std::less<>()(m.begin, begin + bytes);
+      });
+  if (found == mappings_.end()) return std::nullopt;
+  const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+  if (begin != found->begin || (bytes + page - 1) / page * page != found->bytes) return -EINVAL;
+  const SimulatorScope scope;
+  munmap(found->begin, found->bytes);
+  mappings_.erase(found);
+  return 0;
+}
+
 // ---- streams
 
 FileView::Result FileServices::open_stream(const char* function, const char* path, const char* mode,
@@ -413,9 +371,9 @@ FileView::Result FileServices::open_stream(const char* function, const char* pat
 }
 
 FileView::Result FileServices::open_stream(int fd, const char* mode, FILE*& stream) {
-  const OpenFile* file = find(fd);
-  if (file == nullptr) return std::nullopt;
-  if (flags_of(mode) < 0 || file->stream != nullptr) return -EINVAL;
+  const auto found = open_.find(fd);
+  if (found == open_.end()) return std::nullopt;
+  if (flags_of(mode) < 0 || found->second.stream != nullptr) return -EINVAL;
   return make_stream(fd, mode, stream);
 }
 
@@ -437,8 +395,8 @@ long FileServices::make_stream(int fd, const char* mode, FILE*& stream) {
 }
 
 FileView::Result FileServices::descriptor_of(FILE* stream) {
-  for (const auto& [fd, file] : open_) {
-    if (file.stream != nullptr && file.stream->file == stream) return fd;
+  for (const auto& [fd, descriptor] : open_) {
+    if (descriptor.stream != nullptr && descriptor.stream->file == stream) return fd;
   }
   return std::nullopt;
 }
@@ -447,10 +405,10 @@ FileView::Result FileServices::descriptor_of(FILE* stream) {
 
 // A DIR of ours is the address of its open file, which is of no use to anybody else.
 FileServices::OpenFile* FileServices::find_folder(DIR* folder, int* fd) {
-  for (auto& [number, file] : open_) {
-    if (reinterpret_cast<DIR*>(&file) != folder) continue;
+  for (auto& [number, descriptor] : open_) {
+    if (reinterpret_cast<DIR*>(descriptor.file.get()) != folder) continue;
     if (fd != nullptr) *fd = number;
-    return &file;
+    return descriptor.file.get();
   }
   return nullptr;
 }

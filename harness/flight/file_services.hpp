@@ -12,14 +12,34 @@
 #include <string>
 #include <vector>
 
+#if defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define ORRERY_SANITIZER_OPENS_FILES
+#endif
+#endif
+#if defined(__SANITIZE_ADDRESS__)
+#define ORRERY_SANITIZER_OPENS_FILES
+#endif
+
 namespace orrery::internal {
+
+// To print where an error was, a sanitizer opens files from within flight code.
+#ifdef ORRERY_SANITIZER_OPENS_FILES
+inline constexpr bool kCanRefuse = false;
+#else
+inline constexpr bool kCanRefuse = true;
+#endif
 
 /// Of one life of a process.
 ///
 /// Numbers   Descriptors are 512 to 1023, the lowest free one first, so that none is the host's;
-///           these go to the C library. Paths are seen from "/".
+///           these go to the C library, and neither takes the place of the other. Paths are seen
+///           from "/", until chdir.
 /// Streams   A FILE and its buffer are the C library's, on no simulated heap. What a stream had not
 ///           written when its process crashed is lost with it.
+/// Mappings  MAP_PRIVATE only: a copy of what the file holds at the call, in memory that is no heap
+///           and goes with the process.
+/// Locks     of fcntl are granted: nobody else has these files.
 /// Calls     All functions of FileView are called as flight code, and by nobody else.
 class FileServices final : public FileView {
  public:
@@ -56,6 +76,18 @@ class FileServices final : public FileView {
   Result open_folder(int fd, DIR*& folder) override;
   Result read_folder(DIR* folder, dirent*& entry) override;
   Result close_folder(DIR* folder) override;
+  Result duplicate(int fd, int at_least, bool closes_at_exec) override;
+  Result duplicate_to(const char* function, int fd, int to) override;
+  Result control(int fd, int command, long argument) override;
+  Result map(std::size_t bytes, int protection, int flags, int fd, std::int64_t offset) override;
+  Result unmap(void* address, std::size_t bytes) override;
+  Result make_temporary(const char* function, char* name, int suffix, int flags) override;
+  Result make_temporary_folder(const char* function, char* name, char*& made) override;
+  Result change_folder(const char* function, const char* path) override;
+  Result change_folder(const char* function, int fd) override;
+  Result current_folder(char* to, std::size_t bytes) override;
+  Result real_path(const char* path, char* to, std::size_t bytes) override;
+  Result refuse(const char* function) override;
 
  private:
   struct Stream;
@@ -64,7 +96,6 @@ class FileServices final : public FileView {
     std::string path = {};
     int flags = 0;
     std::uint64_t offset = 0;
-    std::shared_ptr<Stream> stream = nullptr;
     // Of a folder.
     std::vector<std::string> names = {};
     std::size_t next_name = 0;
@@ -73,11 +104,31 @@ class FileServices final : public FileView {
     bool readable() const;
     bool writable() const;
   };
+  struct Descriptor {
+    std::shared_ptr<OpenFile> file;  // one for all copies of a descriptor
+    std::shared_ptr<Stream> stream = nullptr;
+    int flags = 0;
+  };
+  struct Mapping {
+    std::byte* begin;
+    std::size_t bytes;  // in whole pages
+  };
   enum class Place : std::uint8_t { kOurs, kHost, kAbsent, kRefused };
 
   Place place_of(int folder, const char* text, std::string& path) const;
+  /// action(path), as simulator code, where the path is the spacecraft's.
   template <class Action>
-  Result at_path(const char* function, int folder, const char* path, Action action);
+  Result at_path(const char* function, int folder, const char* path, Action action) {
+    return do_at_path(function, folder, path, &action, [](void* a, const std::string& full) {
+      return static_cast<long>((*static_cast<Action*>(a))(full));
+    });
+  }
+  Result do_at_path(const char* function, int folder, const char* path, void* action,
+                    long (*call)(void* action, const std::string& full));
+  template <class Make>
+  Result at_free_name(const char* function, char* name, int suffix, Make make);
+  static long end_call(const char* refusal);
+  int free_number(int at_least) const;
   long open_node(const std::string& path, int flags);
   long describe(const FlightFiles::Node& node, struct stat* to) const;
   long write_staged(OpenFile& file, std::uint64_t at);
@@ -91,7 +142,9 @@ class FileServices final : public FileView {
   const FlightProcessOptions& options_;
   std::shared_ptr<NonVolatileMemory> memory_;
   const VirtualServices& clock_;
-  std::map<int, OpenFile> open_;
+  std::map<int, Descriptor> open_;
+  std::vector<Mapping> mappings_;
+  std::string folder_ = "/";                      // the working folder
   std::vector<std::shared_ptr<Stream>> orphans_;  // their descriptors were closed under them
   ByteBuffer staging_;  // what is written: a copy, for reading it may fault
 };

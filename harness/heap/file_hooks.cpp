@@ -5,58 +5,24 @@
 // fopen of the C library does not come here for its own open() and read(), so streams of flight
 // code are made with fopencookie (harness/flight/file_services.cpp). std::fstream opens with
 // fopen64, and then reads and writes by the descriptor that fileno gives.
-//
-// Not taken, so that a descriptor of ours is EBADF to them: dup, fcntl, mmap, readv, sendfile. Not
-// taken, and the host's: mkstemp, tmpfile, freopen, realpath, chdir.
 
-#include <orrery/harness/heap/interposition.hpp>
+#include <orrery/harness/heap/file_call.hpp>
 
-#include <cerrno>
 #include <cstdarg>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
-#include <cstdlib>
 #include <dirent.h>
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <type_traits>
 #include <unistd.h>
-
-#define ORRERY_HOOK extern "C" [[gnu::visibility("default")]]
 
 extern "C" const char* orrery_file_hook_not_taken(std::size_t index);
 
 namespace {
 
-using orrery::internal::FileView;
-
-FileView* files() {
-  return orrery::internal::file_view == nullptr ? nullptr : orrery::internal::file_view();
-}
-
-// As a system call of the C library returns: -1 and errno.
-template <class T>
-T returned(long result) {
-  if (result >= 0) return static_cast<T>(result);
-  errno = static_cast<int>(-result);
-  return static_cast<T>(-1);
-}
-
-template <class T>
-T* stream_or_null(long result, T* stream) {
-  if (result >= 0) return stream;
-  errno = static_cast<int>(-result);
-  return nullptr;
-}
-
-template <class Function>
-Function* system_function(const char* name) {
-  void* address = dlsym(RTLD_NEXT, name);
-  if (address == nullptr) std::abort();  // nobody could have linked a call of it
-  return reinterpret_cast<Function*>(address);
-}
+using namespace orrery::internal;
 
 unsigned mode_argument(int flags, va_list arguments) {
   const bool has_mode = (flags & O_CREAT) != 0 || (flags & O_TMPFILE) == O_TMPFILE;
@@ -64,14 +30,6 @@ unsigned mode_argument(int flags, va_list arguments) {
 }
 
 }  // namespace
-
-// Ours, or the C library's: `call` is asked of the view, `type` and `arguments` of the library.
-#define ORRERY_FILE_CALL(type, name, result, call, arguments)                     \
-  if (FileView* view = files()) {                                                 \
-    if (const FileView::Result ours = view->call) return returned<result>(*ours); \
-  }                                                                               \
-  static const std::add_pointer_t<type> system = system_function<type>(#name);    \
-  return system arguments
 
 // ---- descriptors
 
@@ -290,14 +248,6 @@ ORRERY_HOOK int mkdirat(int folder, const char* path, mode_t mode) noexcept {
 }
 
 // ---- streams
-
-#define ORRERY_STREAM_CALL(type, name, object, call, arguments)                         \
-  if (FileView* view = files()) {                                                       \
-    object = nullptr;                                                                   \
-    if (const FileView::Result ours = view->call) return stream_or_null(*ours, object); \
-  }                                                                                     \
-  static const std::add_pointer_t<type> system = system_function<type>(#name);          \
-  return system arguments
 
 ORRERY_HOOK FILE* fopen(const char* path, const char* mode) {
   FILE* stream = nullptr;

@@ -20,6 +20,7 @@ extern "C" [[gnu::weak]] const char* orrery_allocator_hook_not_taken(std::size_t
 extern "C" [[gnu::weak]] bool orrery_services_are_virtual();
 extern "C" [[gnu::weak]] const char* orrery_service_hook_not_taken(std::size_t index);
 extern "C" [[gnu::weak]] const char* orrery_file_hook_not_taken(std::size_t index);
+extern "C" [[gnu::weak]] const char* orrery_descriptor_hook_not_taken(std::size_t index);
 
 namespace orrery {
 namespace internal {
@@ -102,7 +103,10 @@ std::string verify_interposition() {
   };
   if (heap_simulation_available()) ask(orrery_allocator_hook_not_taken);
   if (services_are_virtual()) ask(orrery_service_hook_not_taken);
-  if (files_are_virtual()) ask(orrery_file_hook_not_taken);
+  if (files_are_virtual()) {
+    ask(orrery_file_hook_not_taken);
+    ask(orrery_descriptor_hook_not_taken);
+  }
   if (names.empty()) return "";
   return "these functions of the simulated heap are not reached by shared libraries: " + names +
          "; link the test program with orrery::allocator, whose --dynamic-list exports them";

@@ -99,6 +99,23 @@ class FileView {
   virtual Result open_folder(int fd, DIR*& folder) = 0;
   virtual Result read_folder(DIR* folder, dirent*& entry) = 0;  // null: no more
   virtual Result close_folder(DIR* folder) = 0;
+  /// dup; the least number is `at_least`.
+  virtual Result duplicate(int fd, int at_least, bool closes_at_exec) = 0;
+  virtual Result duplicate_to(const char* function, int fd, int to) = 0;
+  virtual Result control(int fd, int command, long argument) = 0;  // fcntl
+  /// mmap: the address.
+  virtual Result map(std::size_t bytes, int protection, int flags, int fd, std::int64_t offset) = 0;
+  virtual Result unmap(void* address, std::size_t bytes) = 0;
+  /// mkstemp: fills in the six X that stand before the last `suffix` characters.
+  virtual Result make_temporary(const char* function, char* name, int suffix, int flags) = 0;
+  virtual Result make_temporary_folder(const char* function, char* name, char*& made) = 0;
+  virtual Result change_folder(const char* function, const char* path) = 0;
+  virtual Result change_folder(const char* function, int fd) = 0;
+  /// The length of a path, which is written with its final zero.
+  virtual Result current_folder(char* to, std::size_t bytes) = 0;
+  virtual Result real_path(const char* path, char* to, std::size_t bytes) = 0;
+  /// What can be no file of flight code, whatever its name.
+  virtual Result refuse(const char* function) = 0;
 };
 /// Set once by harness/flight: of the flight code that is running, or null.
 using FileViewFunction = FileView*();

@@ -134,6 +134,81 @@ TEST(FlightFilesTest, OtherPathsAreRefusedAbsentOrTheHosts) {
   std::remove(path.c_str());
 }
 
+TEST(FlightFilesTest, CopiesOfADescriptorShareTheirOffsetAndFlags) {
+  const auto process = booted(options({{"/data/a", "abcdef"}, {"/data/b", "B"}}));
+  EXPECT_EQ(ask(*process, "dup /data/a"), "ab|cd|b|c|1|errno EBADF");
+  EXPECT_EQ(ask(*process, "dup2 /data/a /data/b"), "abcdef");
+  EXPECT_EQ(ask(*process, "fcntl /data/a"), "700 10 append free -1");
+  EXPECT_EQ(content(*process, "/data/a"), "abcdef!");
+  EXPECT_EQ(ask(*process, "many /data/b"), "512 errno EMFILE");  // all of them were closed
+}
+
+TEST(FlightFilesTest, AFileDoesNotTakeTheNumberOfOneOfTheHosts) {
+  if (!heap_simulation_available()) GTEST_SKIP() << "under a sanitizer it fails with EPERM";
+  const auto process = booted(options({{"/data/a", ""}}));
+  EXPECT_THAT(ask(*process, "dup2_to_host /data/a"),
+              HasSubstr("dup2(512, 1) called: between a file of this spacecraft (descriptors 512 "
+                        "to 1023) and one of the host"));
+}
+
+TEST(FlightFilesTest, AMappingIsAPrivateCopy) {
+  if (!heap_simulation_available()) GTEST_SKIP() << "a sanitizer owns mmap";
+  const auto process = booted(options({{"/data/a", "abcde"}}));
+  EXPECT_EQ(ask(*process, "map /data/a"), "Xbcde|0|errno EINVAL|done");
+  EXPECT_EQ(content(*process, "/data/a"), "abcde");
+  for (const char* how : {"map_shared", "map_fixed"}) {
+    EXPECT_THAT(ask(*booted(options({{"/data/a", "abcde"}})), how + std::string(" /data/a")),
+                HasSubstr("mmap of \"/data/a\" called: a file of this spacecraft can be mapped "
+                          "MAP_PRIVATE and where there is room, not MAP_SHARED or MAP_FIXED"));
+  }
+}
+
+TEST(FlightFilesTest, TemporaryNamesAreTheSameInEveryRun) {
+  const auto process = booted(options({{"/data/", ""}}));
+  EXPECT_EQ(ask(*process, "mkstemp /data/aXXXXXX one"), "/data/a000001");
+  EXPECT_EQ(ask(*process, "mkstemp /data/aXXXXXX two"), "/data/a000002");
+  EXPECT_EQ(ask(*process, "mkdtemp /data/aXXXXXX"), "/data/a000003");
+  EXPECT_EQ(ask(*process, "mkstemp /data/a000003/XXXXXX x"), "/data/a000003/000001");
+  EXPECT_EQ(ask(*process, "mkstemp /data/XXXXX five"), "errno EINVAL");
+  EXPECT_EQ(ask(*process, "mkstemp /data/none/XXXXXX x"), "errno ENOENT");
+  EXPECT_EQ(content(*process, "/data/a000002"), "two");
+}
+
+TEST(FlightFilesTest, TheWorkingFolderIsTheProcesss) {
+  const auto process = booted(options({{"/data/log/a", "A"}}));
+  EXPECT_EQ(ask(*process, "getcwd /"), "/ fits");
+  EXPECT_EQ(ask(*process, "chdir /data"), "done");
+  EXPECT_EQ(ask(*process, "getcwd /"), "/data errno ERANGE");
+  EXPECT_EQ(ask(*process, "read log/a"), "A");
+  EXPECT_EQ(ask(*process, "chdir log"), "done");
+  EXPECT_EQ(ask(*process, "read ../log/./a"), "A");
+  EXPECT_EQ(ask(*process, "realpath ../log/a"), "/data/log/a");
+  EXPECT_EQ(ask(*process, "realpath b"), "errno ENOENT");
+  EXPECT_EQ(ask(*process, "chdir a"), "errno ENOTDIR");
+  EXPECT_EQ(ask(*process, "chdir b"), "errno ENOENT");
+  const auto again = booted(options({{"/data/log/a", "A"}}), process->memory());
+  EXPECT_EQ(ask(*again, "getcwd /"), "/ fits");
+}
+
+TEST(FlightFilesTest, WhatWouldBeTheHostsIsRefusedByName) {
+  if (!heap_simulation_available()) GTEST_SKIP() << "under a sanitizer it fails with EPERM";
+  const auto refused = [](const char* question, OtherFiles others) {
+    FlightProcessOptions o = options({{"/data/a", ""}});
+    o.other_files = others;
+    return ask(*booted(o), question);
+  };
+  EXPECT_THAT(refused("tmpfile /", OtherFiles::kRefuse),
+              HasSubstr("tmpfile() called: it works with a file of the host"));
+  EXPECT_THAT(refused("freopen /data/a", OtherFiles::kRefuse), HasSubstr("freopen() called"));
+  EXPECT_EQ(refused("tmpfile /", OtherFiles::kAbsent), "errno EACCES");
+  EXPECT_THAT(refused("chdir /usr", OtherFiles::kRefuse),
+              HasSubstr("chdir(\"/usr\") called: no file of this spacecraft"));
+  EXPECT_EQ(refused("chdir /usr", OtherFiles::kAbsent), "errno ENOENT");
+  EXPECT_THAT(
+      refused("chdir /usr", OtherFiles::kHost),
+      HasSubstr("chdir(\"/usr\") called: it would change the folder of the whole test program"));
+}
+
 TEST(FlightFilesTest, ABadPointerIsACrashOfFlightCode) {
   const auto process = booted(options({{"/a", ""}}));
   EXPECT_THAT(ask(*process, "null /a"), HasSubstr("Segmentation fault"));
@@ -205,10 +280,12 @@ TEST(NonVolatileMemoryTest, ATornStoreKeepsWhatWasBehind) {
   EXPECT_EQ(memory.slot(8), nullptr);
 }
 
+enum class ResetKind { kReboot, kPowerCycle, kKill };
+
 struct Reset {
   const char* name;
   bool loses_unsynced;
-  bool is_power_cycle;
+  ResetKind kind;
   const char* left;  // of "synced " and, after it, "not"
 };
 void PrintTo(const Reset& reset, std::ostream* out) {
@@ -217,8 +294,8 @@ void PrintTo(const Reset& reset, std::ostream* out) {
 
 class FileLifeTest : public testing::TestWithParam<Reset> {};
 
-// The table of contracts.md: a write reaches storage at the call, and what no fsync has followed is
-// lost on a power cycle where the option says so.
+// The table of contracts.md: a write reaches storage at the call, what a stream still holds does
+// not, and what no fsync has followed is lost on a power cycle where the option says so.
 TEST_P(FileLifeTest, FilesAreKeptAsTheTableSays) {
   FlightProcessOptions o = options({{"/data/log", ""}});
   o.power_loss_takes_unsynced = GetParam().loses_unsynced;
@@ -228,17 +305,22 @@ TEST_P(FileLifeTest, FilesAreKeptAsTheTableSays) {
       loop, loop.add_owner("dsc"), o,
       {.on_output = [&](std::string_view, Bytes bytes) { answers.push_back(text_of(bytes)); }});
   computer.boot();
-  for (const char* what :
-       {"leave /data/log synced ", "flush /", "sync /", "append /data/log not"}) {
+  for (const char* what : {"leave /data/log synced ", "flush /", "sync /", "append /data/log not",
+                           "leave /data/log held by a stream"}) {
     computer.deliver("do", order(what), 0);
     loop.run_until(loop.now() + 1s);
   }
-  if (GetParam().is_power_cycle) {
-    computer.power_cycle(loop.now() + 1s, 1s);
-  } else {
-    computer.reboot(loop.now() + 1s, 1s);
+  const SimTime t = loop.now() + 1s;
+  if (GetParam().kind == ResetKind::kPowerCycle) computer.power_cycle(t, 1s);
+  if (GetParam().kind == ResetKind::kReboot) computer.reboot(t, 1s);
+  if (GetParam().kind == ResetKind::kKill) computer.kill(t);
+  loop.run_until(t + 2s);
+  if (GetParam().kind == ResetKind::kKill) {
+    EXPECT_FALSE(computer.alive());
+    EXPECT_EQ(text_of(computer.memory().files.find("/data/log")->content), GetParam().left);
+    computer.reboot(loop.now(), 1s);  // what is to read it
+    loop.run_until(loop.now() + 2s);
   }
-  loop.run_until(loop.now() + 3s);
   answers.clear();
   computer.deliver("do", order("fopen /data/log"), 0);
   loop.run_until(loop.now() + 1s);
@@ -246,11 +328,13 @@ TEST_P(FileLifeTest, FilesAreKeptAsTheTableSays) {
   EXPECT_THAT(answers, ElementsAre(left + "|" + std::to_string(left.size()) + "|1"));
 }
 
-INSTANTIATE_TEST_SUITE_P(Resets, FileLifeTest,
-                         testing::Values(Reset{"Reboot", true, false, "synced not"},
-                                         Reset{"PowerCycle", false, true, "synced not"},
-                                         Reset{"PowerCycleThatLoses", true, true, "synced "}),
-                         [](const auto& test) { return test.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    Resets, FileLifeTest,
+    testing::Values(Reset{"Reboot", true, ResetKind::kReboot, "synced not"},
+                    Reset{"Kill", true, ResetKind::kKill, "synced not"},
+                    Reset{"PowerCycle", false, ResetKind::kPowerCycle, "synced not"},
+                    Reset{"PowerCycleThatLoses", true, ResetKind::kPowerCycle, "synced "}),
+    [](const auto& test) { return test.param.name; });
 
 TEST(FlightFilesTest, BadOptionsSayWhatIsWrong) {
   const auto message = [](std::map<std::string, std::string> files, std::uint64_t capacity) {

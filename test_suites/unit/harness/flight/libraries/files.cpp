@@ -1,14 +1,17 @@
 // Uses files in every way that flight code does: "<verb> <path> <text>" on "do", one line back on
 // "answers": what was read, or "errno" and its name where a function failed.
 #include <cerrno>
+#include <climits>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <dirent.h>
 #include <fcntl.h>
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -104,6 +107,86 @@ std::string done(int result) {
   return result == 0 ? "done" : failed();
 }
 
+std::string read_some(int fd, std::size_t most) {
+  char text[64];
+  const ssize_t count = read(fd, text, most);
+  return count < 0 ? failed() : std::string(text, static_cast<std::size_t>(count));
+}
+
+// The copy has the offset of the first, outlives it, and is the lowest number.
+std::string copied(const std::string& path) {
+  const int fd = open(path.c_str(), O_RDONLY);
+  const int copy = dup(fd);
+  std::string text = read_some(fd, 2);
+  text += "|" + read_some(copy, 2);
+  lseek(copy, 1, SEEK_SET);
+  text += "|" + read_some(fd, 1);
+  close(fd);
+  text += "|" + read_some(copy, 1) + "|" + std::to_string(copy - fd);
+  close(copy);
+  return text + "|" + read_some(copy, 1);
+}
+
+std::string copied_over(const std::string& path, const std::string& other) {
+  const int fd = open(path.c_str(), O_RDONLY);
+  const int over = open(other.c_str(), O_RDONLY);
+  if (dup2(fd, fd) != fd || dup2(fd, over) != over) return failed();
+  if (dup3(fd, fd, 0) != -1 || errno != EINVAL) return "dup3 of itself";
+  const std::string text = read_some(over, 64);
+  close(over);
+  close(fd);
+  return text;
+}
+
+std::string controlled(const std::string& path) {
+  const int fd = open(path.c_str(), O_RDWR);
+  const int copy = fcntl(fd, F_DUPFD_CLOEXEC, 700);
+  std::string text = std::to_string(copy) + " " + std::to_string(fcntl(copy, F_GETFD)) +
+                     std::to_string(fcntl(fd, F_GETFD));
+  if (fcntl(copy, F_SETFL, O_APPEND) != 0) return failed();
+  text += (fcntl(fd, F_GETFL) == (O_RDWR | O_APPEND)) ? " append" : " no";
+  if (write(fd, "!", 1) != 1) return failed();
+  struct flock lock {};
+  lock.l_type = F_WRLCK;
+  if (fcntl(fd, F_SETLK, &lock) != 0 || fcntl(fd, F_GETLK, &lock) != 0) return failed();
+  text += lock.l_type == F_UNLCK ? " free" : " locked";
+  close(copy);
+  close(fd);
+  return text + " " + std::to_string(fcntl(copy, F_GETFD));
+}
+
+// Written to, and read after its descriptor is closed; of what was mapped only all can be unmapped.
+std::string mapped(const std::string& path, int flags) {
+  const int fd = open(path.c_str(), O_RDONLY);
+  auto* text = static_cast<char*>(mmap(nullptr, 6, PROT_READ | PROT_WRITE, flags, fd, 0));
+  close(fd);
+  if (text == MAP_FAILED) return failed();
+  text[0] = 'X';
+  std::string result(text, 5);
+  result += text[5] == 0 ? "|0" : "|?";
+  result += munmap(text, 8192) == 0 ? "|all" : "|" + failed();
+  return result + (munmap(text, 6) == 0 ? "|done" : "|" + failed());
+}
+
+std::string temporary(std::string name, const std::string& text) {
+  const int fd = mkstemp(name.data());
+  if (fd < 0) return failed();
+  if (write(fd, text.data(), text.size()) < 0) return failed();
+  close(fd);
+  return name;
+}
+
+std::string working_folder() {
+  char text[64] = "";
+  if (getcwd(text, sizeof text) == nullptr) return failed();
+  char* allocated = getcwd(nullptr, 0);
+  const bool same = allocated != nullptr && std::strcmp(allocated, text) == 0;
+  std::free(allocated);
+  char little[2];
+  const bool fits = getcwd(little, sizeof little) != nullptr;
+  return text + std::string(same ? "" : " differs") + (fits ? " fits" : " " + failed());
+}
+
 FILE* left_open = nullptr;
 // Not null, which the undefined-behaviour sanitizer looks for; volatile against the compiler.
 const char* volatile nowhere = reinterpret_cast<const char*>(8);
@@ -151,6 +234,26 @@ std::string perform(const std::string& verb, const std::string& path, const std:
   if (verb == "truncate") return done(truncate(p, 3));
   if (verb == "exists") return std::filesystem::exists(path) ? "yes" : "no";
   if (verb == "null") return std::to_string(open(nowhere, O_RDONLY));
+  if (verb == "dup") return copied(path);
+  if (verb == "dup2") return copied_over(path, text);
+  if (verb == "dup2_to_host") return std::to_string(dup2(open(p, O_RDONLY), 1));
+  if (verb == "fcntl") return controlled(path);
+  if (verb == "map") return mapped(path, MAP_PRIVATE);
+  if (verb == "map_shared") return mapped(path, MAP_SHARED);
+  if (verb == "map_fixed") return mapped(path, MAP_PRIVATE | MAP_FIXED);
+  if (verb == "mkstemp") return temporary(path, text);
+  if (verb == "mkdtemp") {
+    std::string name = path;
+    return mkdtemp(name.data()) == nullptr ? failed() : name;
+  }
+  if (verb == "tmpfile") return std::tmpfile() == nullptr ? failed() : "made";
+  if (verb == "freopen") return std::freopen(p, "w", stdout) == nullptr ? failed() : "made";
+  if (verb == "chdir") return done(chdir(p));
+  if (verb == "getcwd") return working_folder();
+  if (verb == "realpath") {
+    char whole[PATH_MAX];
+    return realpath(p, whole) == nullptr ? failed() : whole;
+  }
   if (verb == "many") {
     int opened = 0;
     while (open(p, O_RDONLY) >= 0) ++opened;
