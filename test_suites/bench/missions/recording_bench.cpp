@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <ctime>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 namespace orrery {
@@ -85,6 +86,30 @@ void BM_RecorderOff(benchmark::State& state) {
 }
 BENCHMARK(BM_RecorderOff);
 
+// What is left to do when a run of 50 h ends: digest, report.html, summary, index.
+void BM_FilesOfALongRun(benchmark::State& state) {
+  const std::filesystem::path out = scratch_folder();
+  setenv("ORRERY_OUT", out.c_str(), 1);
+  double end_s = 0, bytes = 0;
+  for (auto _ : state) {
+    FormationOptions options;
+    options.flight.library = "formation_keeping";
+    std::optional<FormationWorld> world;
+    world.emplace(missions::first_flight(options));
+    world->run_for(state.range(0) * 1h);
+    const double begin_s = cpu_s();
+    world.reset();
+    end_s += cpu_s() - begin_s;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(out)) {
+      if (entry.path().filename() == "report.html") bytes += static_cast<double>(entry.file_size());
+    }
+    std::filesystem::remove_all(out);
+  }
+  const double runs = static_cast<double>(state.iterations());
+  state.counters["end_s"] = end_s / runs;
+  state.counters["report_bytes"] = bytes / runs;
+}
+
 #ifdef __SANITIZE_ADDRESS__
 constexpr int kHours = 1;
 #else
@@ -92,6 +117,11 @@ constexpr int kHours = 20;
 #endif
 // Receivers that say where they are every 10 s, as the reference mission has them; and receivers
 // that give all measurements at 1 Hz.
+BENCHMARK(BM_FilesOfALongRun)
+    ->ArgName("hours")
+    ->Arg(5 * kHours / 2)
+    ->Iterations(1)
+    ->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_RecordingAtOneHertz)
     ->ArgNames({"hours", "receiver_period_s"})
     ->Args({kHours, 10})
