@@ -137,14 +137,15 @@ document.addEventListener("keydown", e => {
   if (does) { e.preventDefault(); does(); }
 });
 const spanOf = fault => [fault.from, fault.until ?? whole[1]];
-// Behind everything that is drawn over time: the spans in which a fault was active.
+// Behind everything that is drawn over time: the spans in which a fault was active. One that could
+// act all the time is a line along the top, or there would be nothing but its shade.
 function drawFaults(g, width, top, bottom) {
   for (const fault of report.faults) {
     const [from, until] = spanOf(fault);
     if (until < view[0] || from > view[1]) continue;
     const x = xOf(Math.max(from, view[0]), width), end = xOf(Math.min(until, view[1]), width);
     g.fillStyle = css("--fault");
-    g.globalAlpha = 0.13;
+    g.globalAlpha = from > whole[0] || until < whole[1] ? 0.13 : 0;
     g.fillRect(x, top, Math.max(end - x, 1.5), bottom - top);
     g.globalAlpha = 0.75;
     g.fillRect(x, top, Math.max(end - x, 1.5), 2);
