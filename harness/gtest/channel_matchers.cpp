@@ -174,11 +174,7 @@ class Rms final : public OverWindow {
 class Percentile final : public OverWindow {
  public:
   Percentile(double percent, double limit, const TimeWindow& window)
-      : OverWindow(window), percent_(percent), limit_(checked("PercentileBelow", limit)) {
-    if (percent > 0 && percent <= 100) return;
-    throw std::invalid_argument("PercentileBelow: " + number(percent) +
-                                " %; accepted: above 0, at most 100");
-  }
+      : OverWindow(window), percent_(percent), limit_(limit) {}
 
  private:
   bool judge(const Channel& channel, const Points& points,
@@ -241,8 +237,15 @@ ChannelMatcher RmsBelow(double limit, const TimeWindow& window) {
   return ChannelMatcher(new Rms(limit, window));
 }
 
-ChannelMatcher PercentileBelow(double percent, double limit, const TimeWindow& window) {
-  return ChannelMatcher(new Percentile(percent, limit, window));
+PercentileBelow::PercentileBelow(double percent, double limit, const TimeWindow& window)
+    : percent_(percent), limit_(checked("PercentileBelow", limit)), window_(window) {
+  if (percent > 0 && percent <= 100) return;
+  throw std::invalid_argument("PercentileBelow: " + number(percent) +
+                              " %; accepted: above 0, at most 100");
+}
+
+PercentileBelow::operator ChannelMatcher() const {
+  return ChannelMatcher(new Percentile(percent_, limit_, window_));
 }
 
 }  // namespace orrery

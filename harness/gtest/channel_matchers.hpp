@@ -26,6 +26,7 @@
 
 namespace orrery {
 
+class CampaignMetric;
 using ChannelMatcher = testing::Matcher<const Channel&>;
 
 /// Every sample is below the limit, the limit itself excluded; not above, the limit included.
@@ -42,7 +43,18 @@ ChannelMatcher SettlesBelow(double limit, Duration within, const TimeWindow& win
 /// Root mean square over the samples, each with the same weight.
 ChannelMatcher RmsBelow(double limit, const TimeWindow& window = always());
 /// The smallest sample that at least `percent` % of the samples do not exceed (nearest rank).
-ChannelMatcher PercentileBelow(double percent, double limit, const TimeWindow& window = always());
+/// Of a metric of a campaign (harness/campaign) likewise, over its runs; a run that did not record
+/// it is worse than any limit. There a window throws std::invalid_argument.
+class PercentileBelow {
+ public:
+  PercentileBelow(double percent, double limit, const TimeWindow& window = always());
+  operator ChannelMatcher() const;
+  operator testing::Matcher<const CampaignMetric&>() const;
+
+ private:
+  double percent_, limit_;
+  TimeWindow window_;
+};
 
 /// No two successive samples are further apart in time; nor the first from the window's begin, nor
 /// the last from its end, or from that of the run where the window has none.

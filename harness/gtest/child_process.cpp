@@ -25,21 +25,6 @@ std::string_view name_of(std::string_view entry) {
   return entry.substr(0, entry.find('='));
 }
 
-std::vector<std::string> environment_of(const ChildCommand& command) {
-  std::vector<std::string> all;
-  const auto is_replaced = [&command](std::string_view name) {
-    const auto named = [name](const std::string& entry) { return name_of(entry) == name; };
-    return name.starts_with("GTEST_") ||
-           std::any_of(command.removed.begin(), command.removed.end(), named) ||
-           std::any_of(command.environment.begin(), command.environment.end(), named);
-  };
-  for (char** entry = environ; *entry != nullptr; ++entry) {
-    if (!is_replaced(name_of(*entry))) all.emplace_back(*entry);
-  }
-  all.insert(all.end(), command.environment.begin(), command.environment.end());
-  return all;
-}
-
 std::vector<char*> pointers_to(std::vector<std::string>& strings) {
   std::vector<char*> pointers;
   for (std::string& string : strings) pointers.push_back(string.data());
@@ -53,14 +38,14 @@ void turn_address_randomisation_round() {
 }
 
 // In the child, between fork and exec: nothing that allocates.
-[[noreturn]] void become(const std::vector<char*>& arguments, const std::vector<char*>& environment,
+[[noreturn]] void become(const char* program, const std::vector<char*>& arguments, const std::vector<char*>& environment,
                          int output, pid_t parent, bool other_addresses) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(127);  // it died before the call
   dup2(output, STDOUT_FILENO);
   dup2(output, STDERR_FILENO);
   if (other_addresses) turn_address_randomisation_round();
-  execve("/proc/self/exe", arguments.data(), environment.data());
+  execve(program, arguments.data(), environment.data());
   _exit(127);
 }
 
@@ -78,15 +63,30 @@ std::string tail_of(int pipe) {
 
 }  // namespace
 
+std::vector<std::string> internal::child_environment(const ChildCommand& command) {
+  std::vector<std::string> all;
+  const auto is_replaced = [&command](std::string_view name) {
+    const auto named = [name](const std::string& entry) { return name_of(entry) == name; };
+    return name.starts_with("GTEST_") ||
+           std::any_of(command.removed.begin(), command.removed.end(), named) ||
+           std::any_of(command.environment.begin(), command.environment.end(), named);
+  };
+  for (char** entry = environ; *entry != nullptr; ++entry) {
+    if (!is_replaced(name_of(*entry))) all.emplace_back(*entry);
+  }
+  all.insert(all.end(), command.environment.begin(), command.environment.end());
+  return all;
+}
+
 std::string ChildOutcome::describe() const {
   if (exit_code >= 0) return "ended with exit code " + std::to_string(exit_code);
   return "was ended by signal " + std::to_string(signal);
 }
 
 ChildOutcome run_child(const ChildCommand& command) {
-  std::vector<std::string> arguments = {"/proc/self/exe"};
+  std::vector<std::string> arguments = {command.program};
   arguments.insert(arguments.end(), command.arguments.begin(), command.arguments.end());
-  std::vector<std::string> environment = environment_of(command);
+  std::vector<std::string> environment = internal::child_environment(command);
   const std::vector<char*> argv = pointers_to(arguments), envp = pointers_to(environment);
 
   int ends[2];
@@ -95,7 +95,7 @@ ChildOutcome run_child(const ChildCommand& command) {
   const pid_t child = fork();
   if (child == 0) {
     close(ends[0]);
-    become(argv, envp, ends[1], parent, command.other_addresses);
+    become(command.program.c_str(), argv, envp, ends[1], parent, command.other_addresses);
   }
   close(ends[1]);
   if (child < 0) {

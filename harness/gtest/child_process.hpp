@@ -14,6 +14,7 @@ struct ChildCommand {
   std::vector<std::string> arguments;    // without the program's name
   std::vector<std::string> environment;  // "NAME=value", added to this one's
   std::vector<std::string> removed;      // names; all GTEST_* go in any case
+  std::string program = "/proc/self/exe";
   /// With address randomisation where this process has none, and without where it has.
   bool other_addresses = false;
 };
@@ -27,9 +28,14 @@ struct ChildOutcome {
   std::string describe() const;  // "ended with exit code 1", "was ended by signal 11"
 };
 
-/// Starts /proc/self/exe and waits for it. It dies with this process.
+/// Starts it and waits for it. It dies with this process.
 /// @throws std::runtime_error  it cannot be started.
 ChildOutcome run_child(const ChildCommand& command);
+
+namespace internal {
+/// The environment of such a child.
+std::vector<std::string> child_environment(const ChildCommand& command);
+}  // namespace internal
 
 /// For what a child leaves; removed with all that is in it.
 class TemporaryFolder {

@@ -83,6 +83,7 @@ Repeat repeat(const testing::TestInfo& test, const RunVariation& variation, bool
   ChildCommand command;
   command.arguments = {"--gtest_filter=" + std::string(test.test_suite_name()) + "." + test.name(),
                        "--orrery_seed=" + std::to_string(flags().seed)};
+  if (flags().run) command.arguments.push_back("--orrery_run=" + std::to_string(*flags().run));
   if (flags().runs) command.arguments.push_back("--orrery_runs=" + std::to_string(*flags().runs));
   command.environment = {to_variable({traces, variation}), "ORRERY_VERIFY_DETERMINISM=0"};
   command.removed = {"ORRERY_OUT", "ORRERY_RECORD", "ORRERY_LOG", "ORRERY_PROGRESS",

@@ -1,5 +1,6 @@
 #include <orrery/harness/gtest/flags.hpp>
 #include <orrery/harness/gtest/listener.hpp>
+#include <orrery/harness/gtest/run_record.hpp>
 
 #include <algorithm>
 #include <charconv>
@@ -109,6 +110,19 @@ const std::map<std::string, Setter>& setters() {
        [](Flags& f, std::string_view v) {
          f.runs = static_cast<int>(parse_integer("runs", v, 1, 1000000));
        }},
+      {"run",
+       [](Flags& f, std::string_view v) {
+         f.run = static_cast<std::uint32_t>(parse_integer("run", v, 0, 9999999));
+       }},
+      {"jobs",
+       [](Flags& f, std::string_view v) {
+         f.jobs = static_cast<int>(parse_integer("jobs", v, 1, 1024));
+       }},
+      {"campaign",
+       [](Flags& f, std::string_view v) {
+         if (v.empty()) refuse("campaign", v, "a folder");
+         f.campaign = v;
+       }},
       {"out",
        [](Flags& f, std::string_view v) {
          if (v.empty()) refuse("out", v, "a folder");
@@ -155,6 +169,7 @@ std::string upper(std::string text) {
 struct State {
   Flags flags;
   std::string program = "<test program>";
+  std::vector<std::string> given = {};
   bool from_command_line = false;
 };
 
@@ -228,6 +243,8 @@ void Init(int* argc, char** argv) {
   }
   if (*argc > 0) state().program = argv[0];
   state().from_command_line = true;
+  state().given = ours;
+  internal::adopt_run_record();
   install_listener();
   *argc = kept;
 }
@@ -240,6 +257,9 @@ bool initialised() {
 }
 const std::string& program_name() {
   return state().program;
+}
+const std::vector<std::string>& given_flags() {
+  return state().given;
 }
 
 }  // namespace orrery

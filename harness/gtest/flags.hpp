@@ -29,6 +29,11 @@ struct LogSetting {
 struct Flags {
   std::uint64_t seed = 1;                 // --orrery_seed=N, below 2^53
   std::optional<int> runs = {};           // --orrery_runs=N: n of every Seeds()
+  /// --orrery_run=I: run I alone, in this process, of a fly_campaign(), a Seeds(), or with seed
+  /// base + I.
+  std::optional<std::uint32_t> run = {};
+  std::optional<int> jobs = {};           // --orrery_jobs=N: runs at a time of a fly_campaign()
+  std::string campaign = {};  // --orrery_campaign=DIR: judge these results instead of flying
   std::string out = {};                   // --orrery_out=DIR; empty: write nothing
   std::optional<Duration> break_at = {};  // --orrery_break_at=SECONDS since the world's start
   RecordSetting record = {};              // --orrery_record=off|events|PERIOD (1s, 500ms, 10)
@@ -59,6 +64,8 @@ const Flags& flags();
 bool initialised();
 /// How this program was started, for replay commands.
 const std::string& program_name();
+/// The --orrery_* flags that it was given.
+const std::vector<std::string>& given_flags();
 
 /// Parses arguments (without the program's name) over an environment ("ORRERY_SEED=3").
 /// @throws std::invalid_argument  with the text that Init prints.

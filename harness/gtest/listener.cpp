@@ -2,6 +2,7 @@
 #include <orrery/harness/gtest/listener.hpp>
 #include <orrery/harness/gtest/requirements.hpp>
 #include <orrery/harness/gtest/run_context.hpp>
+#include <orrery/harness/gtest/run_record.hpp>
 #include <orrery/harness/heap/interposition.hpp>
 
 #include <gtest/gtest.h>
@@ -29,6 +30,7 @@ class Listener : public testing::EmptyTestEventListener {
     set_current_test(std::string(test.test_suite_name()) + "." + test.name());
     internal::begin_determinism_check();
     internal::begin_requirements();
+    internal::begin_run_record(test);
   }
   // Before GoogleTest's own printer, so that a failure that is added here is the test's.
   void OnTestEnd(const testing::TestInfo& test) override {
@@ -36,11 +38,14 @@ class Listener : public testing::EmptyTestEventListener {
     internal::end_determinism_check(test);
     for (const EndOfTest& end : ends_of_tests()) end(test);
     internal::end_requirements(test);
+    internal::end_run_record(test);
     set_current_test({});
   }
 
   void OnTestPartResult(const testing::TestPartResult& result) override {
-    if (!result.failed() || explained_) return;
+    if (!result.failed()) return;
+    internal::note_failure(result.file_name(), result.line_number(), result.message());
+    if (explained_) return;
     const std::string runs = describe_live_runs();
     if (runs.empty() && !world_was_noted()) return;  // none of ours
     explained_ = true;

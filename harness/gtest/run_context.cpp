@@ -85,6 +85,7 @@ std::string replay_command() {
   for (const Flags::Target& target : flags().targets) {
     command += " --orrery_target='" + target.process + "=" + to_string(target.address) + "'";
   }
+  if (flags().run) command += " --orrery_run=" + std::to_string(*flags().run);
   if (flags().runs) command += " --orrery_runs=" + std::to_string(*flags().runs);
   return command;
 }

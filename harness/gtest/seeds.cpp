@@ -10,6 +10,7 @@ namespace orrery {
 testing::internal::ParamGenerator<RunId> Seeds(int n) {
   if (n < 1)
     throw std::invalid_argument("Seeds: n = " + std::to_string(n) + ", expected at least 1");
+  if (flags().run) return testing::ValuesIn({RunId{flags().seed + *flags().run, *flags().run}});
   const int count = flags().runs.value_or(n);
   std::vector<RunId> runs;
   for (int i = 0; i < count; ++i) {

@@ -11,7 +11,8 @@ namespace orrery {
 
 /// RunIds 0 ... n-1 with seeds base, base+1 ... The base is --orrery_seed, else ORRERY_SEED, else
 /// 1;
-/// --orrery_runs replaces n. @throws std::invalid_argument  n < 1.
+/// --orrery_runs replaces n; with --orrery_run=I run I is the only one, and the test's name ends in
+/// /0. @throws std::invalid_argument  n < 1.
 testing::internal::ParamGenerator<RunId> Seeds(int n);
 
 /// "seed 17 (run 16)"

@@ -74,6 +74,9 @@ void check(const ColdGasThrusterOptions& o) {
   sigma("scale_sigma", o.scale_sigma, 0.1, "0 to 0.1");
   sigma("misalignment_sigma_deg", o.misalignment_sigma_deg, 10, "0 to 10 deg");
   sigma("shot_sigma", o.shot_sigma, 0.1, "0 to 0.1");
+  require(o.gain >= 0.01 && o.gain <= 10, "gain", to_text(o.gain), "0.01 to 10");
+  require(std::fabs(o.misalignment_deg) <= 30, "misalignment_deg", to_text(o.misalignment_deg),
+          "-30 to 30 deg");
   require(o.on_time_quantum > 0ns, "on_time_quantum", to_string(o.on_time_quantum), "above 0 s");
   require(o.minimum_on_time > 0ns && o.minimum_on_time % o.on_time_quantum == 0ns,
           "minimum_on_time", to_string(o.minimum_on_time), "a multiple of on_time_quantum");
@@ -349,13 +352,15 @@ void ColdGasThruster::begin_thrust(DeviceContext& io, int nozzle, double shot_fa
 Thrust ColdGasThruster::thrust_of(DeviceContext& io, int nozzle, double shot_factor) const {
   const Nozzle& n = nozzles_[static_cast<std::size_t>(nozzle)];
   const double weak = fault(io, nozzle, "weak", 1);
-  const double tilt_rad = n.tilt_rad[0] + fault(io, nozzle, "misaligned", 0) * kDegree;
+  const double more_deg = options_.misalignment_deg + fault(io, nozzle, "misaligned", 0);
+  const double tilt_rad = n.tilt_rad[0] + more_deg * kDegree;
   const Axes axes = axes_of(nozzle);
   // A tilt about one transverse axis moves the direction along the other.
   const Vec3 direction_B = unit(axes.along + std::tan(tilt_rad) * axes.second_transverse +
                                 std::tan(n.tilt_rad[1]) * axes.first_transverse);
-  return Thrust::body_fixed(options_.force_N * n.scale * shot_factor * weak * direction_B,
-                            options_.isp_s);
+  return Thrust::body_fixed(
+      options_.force_N * options_.gain * n.scale * shot_factor * weak * direction_B,
+      options_.isp_s);
 }
 
 double ColdGasThruster::fault(DeviceContext& io, int nozzle, const char* name,

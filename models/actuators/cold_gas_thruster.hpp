@@ -27,6 +27,8 @@ struct ColdGasThrusterOptions {
   double scale_sigma = 0.02;            // of a nozzle's force, constant per run
   double misalignment_sigma_deg = 0.5;  // of a nozzle about each transverse axis, constant per run
   double shot_sigma = 0.01;             // of a nozzle's force, from firing to firing
+  double gain = 1;                      // of all nozzles' forces on top, 0.01 to 10
+  double misalignment_deg = 0;          // of each about its first transverse axis on top, -30 to 30
   double propellant_kg = 0.5;           // part of the spacecraft's mass
   /// Mass with which flight commands are converted, at the start; empty: the true one then.
   std::optional<double> commanded_mass_kg = {};
@@ -43,7 +45,8 @@ struct ColdGasThrusterOptions {
 ///             duration}: one nozzle as it is; those that overlap in time are one firing.
 /// Edges       On-times are those of thrust: the valve is told to open `opening_delay` before it
 ///             begins, and to close `closing_delay` before it ends, each to the nanosecond.
-/// Truth       Force and flow are nominal * (1 + scale error) (1 + shot error), directions tilted
+/// Truth       Force and flow are nominal * gain (1 + scale error) (1 + shot error), directions
+/// tilted
 ///             by the misalignment. Flow = force / (g0 Isp). When the tank is empty, thrust ends
 ///             to the nanosecond and never comes back; commands are still accepted and valves move.
 /// Rejected    A wrong length or nozzle, a number that is not finite, an impulse above the maximum

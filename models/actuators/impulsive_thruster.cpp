@@ -1,6 +1,7 @@
 #include <orrery/harness/kernel/text.hpp>
 #include <orrery/models/actuators/impulsive_thruster.hpp>
 
+#include <cmath>
 #include <stdexcept>
 
 #include "orrery_messages.h"
@@ -40,6 +41,14 @@ ImpulsiveThruster::ImpulsiveThruster(const Options& options) : options_(options)
         "ImpulsiveThruster: maximum_dv_mps = " + to_text(options.maximum_dv_mps) +
         " m/s; accepted: above 0, to 10000 m/s");
   }
+  if (!(options.gain >= 0 && options.gain <= 10)) {
+    throw std::invalid_argument("ImpulsiveThruster: gain = " + to_text(options.gain) +
+                                "; accepted: 0 to 10");
+  }
+  if (!(std::fabs(options.misalignment_deg) <= 90)) {
+    throw std::invalid_argument("ImpulsiveThruster: misalignment_deg = " +
+                                to_text(options.misalignment_deg) + "; accepted: -90 to 90");
+  }
 }
 
 void ImpulsiveThruster::from_flight(DeviceContext& io, Bytes bytes) {
@@ -66,12 +75,25 @@ void ImpulsiveThruster::from_flight(DeviceContext& io, Bytes bytes) {
   io.after(delay, [this, &io, dv_ECI = command.dv_ECI] { burn(io, dv_ECI); });
 }
 
+Vec3 ImpulsiveThruster::delivered_ECI(DeviceContext& io, const Vec3& dv_ECI) const {
+  const Vec3 dv = options_.gain * dv_ECI;
+  if (options_.misalignment_deg == 0 || norm(dv) == 0) return dv;
+  constexpr double kDegree = 3.14159265358979323846 / 180;
+  const double angle_rad = options_.misalignment_deg * kDegree;
+  const Mat3 R_BI = io.R_BI();
+  const Vec3 dv_B = R_BI * dv, u_B = unit(dv_B);
+  const Vec3 transverse_B = std::fabs(u_B.z) > 0.9945 ? Vec3{1, 0, 0} : Vec3{0, 0, 1};
+  const Vec3 axis_B = unit(cross(u_B, transverse_B));
+  return transpose(R_BI) * (std::cos(angle_rad) * dv_B + std::sin(angle_rad) * cross(axis_B, dv_B));
+}
+
 void ImpulsiveThruster::burn(DeviceContext& io, const Vec3& dv_ECI) {
   const bool executed = io.fault("lost", 0.0) == 0.0;
-  const double delivered_mps = executed ? norm(dv_ECI) : 0.0;
+  const Vec3 delivered = delivered_ECI(io, dv_ECI);
+  const double delivered_mps = executed ? norm(delivered) : 0.0;
   log_burn({io.now(), dv_ECI, executed});
   delta_v_mps_ += delivered_mps;
-  if (executed) io.apply_impulse(dv_ECI);
+  if (executed) io.apply_impulse(delivered);
   io.record("dv_mps", delivered_mps);
 }
 

@@ -102,7 +102,8 @@ TEST(ChannelMatcherTest, ANumberThatIsNoneFailsAndIsPlaced) {
   const Channel samples = channel({1, std::numeric_limits<double>::quiet_NaN(), 1});
   for (const ChannelMatcher& matcher :
        {AlwaysBelow(5), NeverAbove(5), AlwaysAbove(0), NeverBelow(0), RmsBelow(5),
-        PercentileBelow(50, 5), EventuallyWithin(0, 5), SettlesBelow(5, 1s), NoGapLongerThan(5s)}) {
+        ChannelMatcher(PercentileBelow(50, 5)), EventuallyWithin(0, 5), SettlesBelow(5, 1s),
+        NoGapLongerThan(5s)}) {
     EXPECT_NONFATAL_FAILURE(EXPECT_FALSE(matches(matcher, samples)),
                             "\"dsc/navigation/error_m\" is not a number at 1 s");
     EXPECT_EQ(explanation(matcher, samples), "\"dsc/navigation/error_m\" is not a number at 1 s");

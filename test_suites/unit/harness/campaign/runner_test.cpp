@@ -1,0 +1,230 @@
+// orrery-campaign run and accept, as programs.
+#include <orrery/harness/campaign/run_store.hpp>
+#include <orrery/harness/gtest/child_process.hpp>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <random>
+#include <string>
+#include <sys/wait.h>
+#include <thread>
+#include <unistd.h>
+
+namespace orrery {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+struct Ended {
+  int code = -1;
+  std::string output;
+};
+
+Ended shell(const std::string& command) {
+  Ended ended;
+  FILE* pipe = popen((command + " 2>&1").c_str(), "r");
+  std::array<char, 4096> buffer;
+  while (std::size_t n = fread(buffer.data(), 1, buffer.size(), pipe)) {
+    ended.output.append(buffer.data(), n);
+  }
+  const int status = pclose(pipe);
+  if (WIFEXITED(status)) ended.code = WEXITSTATUS(status);
+  return ended;
+}
+
+Ended campaign(const std::string& arguments) {
+  return shell(ORRERY_CAMPAIGN " " + arguments);
+}
+
+// What is left of each run, in the order of the runs, without what differs from host to host.
+std::string results_in(const std::filesystem::path& folder) {
+  std::string text;
+  for (const auto& [index, record] : read_runs(folder).runs) {
+    RunRecord r = record;
+    r.wall_s = r.cpu_s = 0;
+    r.peak_kB = 0;
+    text += to_json_line(r) + "\n";
+  }
+  return text;
+}
+
+std::size_t lines_in(const std::filesystem::path& folder) {
+  std::size_t n = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().extension() == ".jsonl") n += read_run_file(entry.path()).size();
+  }
+  return n;
+}
+
+class CampaignToolTest : public testing::Test {
+ protected:
+  std::string out(const char* name = "out") const { return (folder / name).string(); }
+  std::string run(const std::string& test, const char* name = "out") const {
+    return "run " CAMPAIGN_PROGRAM " --filter " + test + " --out " + out(name) + " ";
+  }
+  TemporaryFolder folder{"campaign"};
+};
+
+TEST_F(CampaignToolTest, FliesWhatTheTestDeclaresAndLetsItJudge) {
+  const Ended passes = campaign(run("Steady.Passes"));
+  EXPECT_EQ(passes.code, 0) << passes.output;
+  EXPECT_EQ(read_runs(out()).runs.size(), 20u);
+  EXPECT_THAT(passes.output, AllOf(HasSubstr("passed 20"), HasSubstr("[  PASSED  ] 1 test"),
+                                   Not(HasSubstr("\r"))));
+  const Ended fails = campaign(run("Steady.MissesItsLimits", "other"));
+  EXPECT_EQ(fails.code, 1);
+  EXPECT_THAT(fails.output, HasSubstr("it is 4.75, in run 18 (seed 19)"));
+  EXPECT_EQ(campaign("accept " + out("other")).code, 1);
+}
+
+TEST_F(CampaignToolTest, FliesEveryRunOfAnyOtherTest) {
+  const Ended ended = campaign(run("Seeds/PlainTest.HasARun/0") + "--runs 4");
+  EXPECT_EQ(ended.code, 1);
+  EXPECT_THAT(ended.output, AllOf(HasSubstr("passed 3, failed 1"), HasSubstr("--orrery_run=2")));
+  EXPECT_EQ(*read_runs(out()).runs.at(3).metric("seed"), 4);
+  EXPECT_THAT(campaign(run("Seeds/PlainTest.HasARun/0", "b")).output, HasSubstr("--runs N"));
+}
+
+TEST_F(CampaignToolTest, ResultsDoNotDependOnJobsOrShards) {
+  campaign(run("Mixed.IsJudgedAsAWhole", "one") + "-j1 --seed 5");
+  campaign(run("Mixed.IsJudgedAsAWhole", "four") + "-j4 --seed 5");
+  for (const char* shard : {"1/3", "2/3", "3/3"}) {
+    campaign(run("Mixed.IsJudgedAsAWhole", "shards") + "-j2 --seed 5 --runs 10 --shard " + shard);
+  }
+  const std::string one = results_in(out("one"));
+  EXPECT_THAT(one, HasSubstr("\"seed\":14"));
+  EXPECT_EQ(one, results_in(out("four")));
+  EXPECT_EQ(one, results_in(out("shards")));
+  EXPECT_EQ(lines_in(out("shards")), 10u);
+  EXPECT_EQ(campaign("accept " + out("shards")).code, 0);
+}
+
+TEST_F(CampaignToolTest, ResumesWhatIsMissingAndNothingElse) {
+  campaign(run("Many.Empty") + "--runs 5");
+  EXPECT_THAT(campaign(run("Many.Empty") + "--runs 5").output, HasSubstr("--resume"));
+  EXPECT_EQ(campaign(run("Many.Empty") + "--runs 9 --resume").code, 0);
+  EXPECT_EQ(lines_in(out()), 9u);
+  EXPECT_EQ(read_runs(out()).runs.size(), 9u);
+}
+
+TEST_F(CampaignToolTest, AFailureStaysOneWhenItIsRetried) {
+  campaign(run("Mixed.IsJudgedAsAWhole"));
+  const std::string before = results_in(out());
+  const Ended retried = campaign(run("Mixed.IsJudgedAsAWhole") + "--retry-failed");
+  EXPECT_EQ(retried.code, 0) << retried.output;  // 7 of 10 are what that test asks for
+  EXPECT_EQ(lines_in(out()), 13u);
+  EXPECT_EQ(results_in(out()), before);
+}
+
+TEST_F(CampaignToolTest, AnotherResultOfTheSameRunIsADefect) {
+  setenv("UNSTEADY_FILE", (folder / "times").c_str(), 1);
+  campaign(run("Unsteady.GivesAnotherResult"));
+  const Ended retried = campaign(run("Unsteady.GivesAnotherResult") + "--retry-failed");
+  unsetenv("UNSTEADY_FILE");
+  EXPECT_EQ(retried.code, 3);
+  EXPECT_THAT(retried.output, HasSubstr("DEFECT: run 0 (seed 1) gave another result: the outcome "
+                                        "is passed, was failed"));
+  EXPECT_EQ(read_runs(out()).runs.at(0).outcome, RunOutcome::kFailed);
+}
+
+TEST_F(CampaignToolTest, IsRefusedWhereTheProgramOrItsDataHasChanged) {
+  const std::string copy = out("program"), data = out("data");
+  std::filesystem::copy_file(CAMPAIGN_PROGRAM, copy);
+  std::ofstream(data) << "one";
+  const std::string command =
+      "run " + copy + " --filter Many.Empty --runs 3 --out " + out() + " --data " + data + " ";
+  EXPECT_EQ(campaign(command).code, 0);
+  EXPECT_EQ(campaign(command + "--resume").code, 0);
+  EXPECT_THAT(campaign(command + "--resume --seed 2").output,
+              HasSubstr("the base seed is 2, was 1"));
+  std::ofstream(data) << "two";
+  const Ended other_data = campaign(command + "--resume");
+  EXPECT_EQ(other_data.code, 2);
+  EXPECT_THAT(other_data.output, HasSubstr("the SHA-256 of " + data));
+  std::ofstream(data) << "one";
+  std::ofstream(copy, std::ios::app | std::ios::binary) << 'x';  // still runs
+  const Ended other_program = campaign(command + "--retry-failed");
+  EXPECT_EQ(other_program.code, 2);
+  EXPECT_THAT(other_program.output, HasSubstr("the program's SHA-256 is"));
+  EXPECT_EQ(campaign("accept " + out()).code, 2);
+}
+
+TEST_F(CampaignToolTest, StopsAtTheFirstFailure) {
+  const Ended ended = campaign(run("Mixed.IsJudgedAsAWhole") + "-j1 --until-failure");
+  EXPECT_EQ(ended.code, 1);
+  EXPECT_EQ(lines_in(out()), 4u) << "run 3 crashes";
+}
+
+TEST_F(CampaignToolTest, ATimeLimitCostsOneRun) {
+  const Ended ended = campaign(run("Host.AHangIsNoResult") + "--time-limit 0.5");
+  EXPECT_EQ(ended.code, 1);
+  EXPECT_THAT(ended.output, AllOf(HasSubstr("passed 2, timeout 1"), HasSubstr("without a result")));
+}
+
+TEST_F(CampaignToolTest, SaysWhatIsWrongWithItsArguments) {
+  for (const char* arguments :
+       {"fly", "run", "run x", "run x --filter 'A.*'", "run x --filter A.B -j0",
+        "run x --filter A.B --shard 3/2", "run x --filter A.B --bogus",
+        "run x --filter A.B -- --gtest_repeat=2", "report"}) {
+    EXPECT_EQ(campaign(arguments).code, 2) << arguments;
+  }
+  EXPECT_THAT(campaign("run /nowhere/x --filter A.B").output, HasSubstr("/nowhere/x"));
+}
+
+// Whenever it is killed: what was written stays, is whole, and the rest is flown once. 200 times
+// with ORRERY_KILLS=200.
+TEST_F(CampaignToolTest, AKillLosesTheRunsInFlightAndNoMore) {
+  constexpr std::uint32_t kRuns = 40;
+  const char* asked = std::getenv("ORRERY_KILLS");
+  const int kills = asked == nullptr ? 8 : std::atoi(asked);
+  const std::string flags = "-j2 --runs " + std::to_string(kRuns) + " ";
+  campaign(run("Many.Empty", "whole") + flags);
+  const std::string whole = results_in(out("whole"));
+  std::mt19937 random(1);
+  const std::string command = "exec " ORRERY_CAMPAIGN " " + run("Many.Empty", "killed") + flags;
+  for (int i = 0; i < kills; ++i) {
+    std::filesystem::remove_all(out("killed"));
+    std::size_t kept = 0;
+    for (int lives = 0; kept < kRuns; ++lives) {
+      const pid_t child = fork();
+      if (child == 0) {
+        const std::string quiet = command + (lives > 0 ? "--resume" : "") + " >/dev/null 2>&1";
+        execl("/bin/sh", "sh", "-c", quiet.c_str(), nullptr);
+        _exit(127);
+      }
+      const auto after = std::chrono::milliseconds(random() % 250);
+      std::this_thread::sleep_for(after);
+      // Ctrl-C, as a terminal sends it, or worse; the last life is left alone.
+      if (lives < 3) kill(child, random() % 3 == 0 ? SIGINT : SIGKILL);
+      waitpid(child, nullptr, 0);
+      if (!std::filesystem::exists(out("killed"))) continue;
+      const std::size_t now = lines_in(out("killed"));
+      EXPECT_GE(now, kept) << "a result is gone";
+      kept = now;
+      ASSERT_LT(lives, 10);
+    }
+    ASSERT_EQ(results_in(out("killed")), whole);
+    ASSERT_EQ(lines_in(out("killed")), kRuns) << "a run was flown twice";
+  }
+}
+
+// 1,000 empty runs in less than 10 s with -j2 is what is aimed at; no time is asserted, but shown.
+TEST_F(CampaignToolTest, ManyEmptyRunsEndSoon) {
+  const int runs = std::getenv("ORRERY_KILLS") == nullptr ? 100 : 1000;
+  const Ended ended = campaign(run("Many.Empty") + "-j2 --runs " + std::to_string(runs));
+  EXPECT_EQ(ended.code, 0);
+  std::printf("%s", ended.output.substr(0, ended.output.find('\n') + 1).c_str());
+}
+
+}  // namespace
+}  // namespace orrery
