@@ -98,17 +98,23 @@ std::vector<RunRecord> read_run_file(const std::filesystem::path& file) {
   return records;
 }
 
-MergedRuns read_runs(const std::filesystem::path& folder) {
+std::vector<RunRecord> all_records(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> files;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();
     if (name.starts_with("runs") && name.ends_with(".jsonl")) files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());
-  MergedRuns merged;
+  std::vector<RunRecord> records;
   for (const auto& file : files) {
-    for (const RunRecord& record : read_run_file(file)) merged.add(record);
+    for (RunRecord& record : read_run_file(file)) records.push_back(std::move(record));
   }
+  return records;
+}
+
+MergedRuns read_runs(const std::filesystem::path& folder) {
+  MergedRuns merged;
+  for (const RunRecord& record : all_records(folder)) merged.add(record);
   return merged;
 }
 

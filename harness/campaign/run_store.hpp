@@ -48,6 +48,8 @@ struct MergedRuns {
 /// All files runs*.jsonl of a folder, in the order of their names. The torn last line of a file is
 /// passed over. @throws std::runtime_error  another line that is no record: file, line.
 MergedRuns read_runs(const std::filesystem::path& folder);
+/// The same one by one, every try of a run. @throws as above.
+std::vector<RunRecord> all_records(const std::filesystem::path& folder);
 /// The records of one file. @throws as above.
 std::vector<RunRecord> read_run_file(const std::filesystem::path& file);
 

@@ -181,6 +181,24 @@ TEST_F(CampaignToolTest, SaysWhatIsWrongWithItsArguments) {
   EXPECT_THAT(campaign("run /nowhere/x --filter A.B").output, HasSubstr("/nowhere/x"));
 }
 
+// Three hosts without a common disk: their folders become one, which is judged and reported.
+TEST_F(CampaignToolTest, MergesFoldersOfOneCampaign) {
+  campaign(run("Steady.Passes", "whole"));
+  campaign(run("Steady.Passes", "a") + "--runs 20 --shard 1/2");
+  campaign(run("Steady.Passes", "b") + "--runs 20 --shard 2/2");
+  const std::string parts = out("a") + " " + out("b");
+  EXPECT_EQ(campaign("accept " + out("a")).code, 1) << "half of it is missing";
+  EXPECT_EQ(campaign("merge " + out("all") + " " + parts).code, 0);
+  EXPECT_EQ(results_in(out("all")), results_in(out("whole")));
+  EXPECT_EQ(campaign("accept " + out("all")).code, 0);
+  EXPECT_EQ(campaign("report " + out("all") + " --csv " + out("table.csv")).code, 0);
+  for (const char* file : {"all/report.html", "all/campaign.sqlite", "table.csv"}) {
+    EXPECT_GT(std::filesystem::file_size(out(file)), 1000u) << file;
+  }
+  campaign(run("Steady.Passes", "other") + "--seed 2");
+  EXPECT_EQ(campaign("merge " + out("mixed") + " " + parts + " " + out("other")).code, 2);
+}
+
 // Whenever it is killed: what was written stays, is whole, and the rest is flown once. 200 times
 // with ORRERY_KILLS=200.
 TEST_F(CampaignToolTest, AKillLosesTheRunsInFlightAndNoMore) {
