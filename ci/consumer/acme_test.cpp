@@ -109,4 +109,17 @@ TEST(OutgassingTest, MovesTheSpacecraftByHalfATSquared) {
   EXPECT_NEAR(moved.z, 0, 2e-4);
 }
 
+TEST(AcmeCampaign, AHeavierDeputyIsHeardAsWell) {
+  const Campaign campaign = fly_campaign(Runs{4}, [](RunId run) {
+    FormationWorld world({.flight = {.library = "acme_beacon"}, .run = run});
+    world.spacecraft("deputy").disperse("mass_kg", Uniform{11, 12});
+    world.run_for(1min);
+    world.record_metric("mass_kg", world.spacecraft("deputy").truth().mass_kg);
+    EXPECT_GT(world.crosslink("chief", "deputy").from("deputy").sent(), 0);
+  });
+  EXPECT_EQ(campaign.passed().passed, 4u);
+  EXPECT_THAT(campaign.metric("mass_kg"), PercentileBelow(100, 12.001));
+  EXPECT_GE(campaign.metric("mass_kg").percentile(1), 11);
+}
+
 }  // namespace

@@ -26,6 +26,7 @@ struct CampaignOptions {
   std::vector<std::string> data = {};   // files that the runs read
   std::vector<std::string> flags = {};  // --orrery_* that every run is given
   std::filesystem::path html = {}, csv = {}, database = {};
+  std::uint32_t pilot = 0;  // fly only so many, to measure them; 0: all
   // submit
   bool slurm = false, dry_run = false;
   Duration chunk = 60s;

@@ -1,8 +1,10 @@
 // The tool orrery-campaign (harness/campaign/README.md).
+#include <orrery/harness/campaign/bisection.hpp>
 #include <orrery/harness/campaign/campaign_database.hpp>
 #include <orrery/harness/campaign/campaign_options.hpp>
 #include <orrery/harness/campaign/campaign_report.hpp>
 #include <orrery/harness/campaign/campaign_runner.hpp>
+#include <orrery/harness/campaign/slurm_script.hpp>
 
 #include <cstdio>
 #include <fstream>
@@ -79,7 +81,8 @@ int run(const CampaignOptions& options) {
   if (options.command == "accept") return accept_campaign(options.folders.front());
   if (options.command == "merge") return merge(options);
   if (options.command == "report") return report(options);
-  throw orrery::Refused(options.command + ": not available");
+  if (options.command == "submit") return submit_to_slurm(options);
+  return bisect_campaign(options);
 }
 
 }  // namespace

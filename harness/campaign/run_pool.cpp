@@ -156,7 +156,10 @@ struct RunPool::Child {
 RunRecord RunPool::Child::result() {
   take_output();
   RunRecord r;
-  const std::string_view line = std::string_view(record).substr(0, record.find('\n'));
+  std::string_view line = record;
+  const bool begun = line.starts_with(internal::kRunBegun);
+  if (begun) line.remove_prefix(internal::kRunBegun.size());
+  line = line.substr(0, line.find('\n'));
   const std::optional<RunRecord> left = parse_run_record(line);
   if (left) r = *left;
   r.test = command.test;
@@ -174,6 +177,10 @@ RunRecord RunPool::Child::result() {
   } else if (r.signal != 0) {
     r.outcome = is_of_the_host(r.signal) ? RunOutcome::kKilled : RunOutcome::kCrashed;
     r.failure_site = "signal " + std::to_string(r.signal) + ", " + strsignal(r.signal);
+    r.failure_text = output;
+  } else if (!left && begun && r.exit_code != 0) {
+    r.outcome = RunOutcome::kCrashed;
+    r.failure_site = "exit code " + std::to_string(r.exit_code) + " amid the test";
     r.failure_text = output;
   } else if (!left || left->test != r.test || left->run != r.run || left->seed != r.seed) {
     r.outcome = RunOutcome::kError;

@@ -118,6 +118,19 @@ const std::map<std::string, Setter>& setters() {
        [](Flags& f, std::string_view v) {
          f.jobs = static_cast<int>(parse_integer("jobs", v, 1, 1024));
        }},
+      {"set",
+       [](Flags& f, std::string_view v) {
+         const std::size_t equals = v.rfind('=');
+         double value = 0;
+         const char* const end = v.data() + v.size();
+         const auto parsed = equals == std::string_view::npos
+                                 ? std::from_chars_result{v.data(), std::errc::invalid_argument}
+                                 : std::from_chars(v.data() + equals + 1, end, value);
+         if (parsed.ec != std::errc() || parsed.ptr != end) {
+           refuse("set", v, "NAME=NUMBER, as in deputy/mass_kg=11.2");
+         }
+         f.set[std::string(v.substr(0, equals))] = value;
+       }},
       {"campaign",
        [](Flags& f, std::string_view v) {
          if (v.empty()) refuse("campaign", v, "a folder");

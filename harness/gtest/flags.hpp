@@ -7,6 +7,7 @@
 #include <orrery/harness/remote/target_address.hpp>
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -27,14 +28,16 @@ struct LogSetting {
 };
 
 struct Flags {
-  std::uint64_t seed = 1;                 // --orrery_seed=N, below 2^53
-  std::optional<int> runs = {};           // --orrery_runs=N: n of every Seeds()
+  std::uint64_t seed = 1;        // --orrery_seed=N, below 2^53
+  std::optional<int> runs = {};  // --orrery_runs=N: n of every Seeds()
   /// --orrery_run=I: run I alone, in this process, of a fly_campaign(), a Seeds(), or with seed
   /// base + I.
   std::optional<std::uint32_t> run = {};
-  std::optional<int> jobs = {};           // --orrery_jobs=N: runs at a time of a fly_campaign()
+  std::optional<int> jobs = {};  // --orrery_jobs=N: runs at a time of a fly_campaign()
+  /// --orrery_set=NAME=VALUE: in place of what World::draw and disperse draw; repeatable.
+  std::map<std::string, double> set = {};
   std::string campaign = {};  // --orrery_campaign=DIR: judge these results instead of flying
-  std::string out = {};                   // --orrery_out=DIR; empty: write nothing
+  std::string out = {};       // --orrery_out=DIR; empty: write nothing
   std::optional<Duration> break_at = {};  // --orrery_break_at=SECONDS since the world's start
   RecordSetting record = {};              // --orrery_record=off|events|PERIOD (1s, 500ms, 10)
   LogSetting log = {};                    // --orrery_log=LEVEL[,SPACECRAFT]

@@ -66,7 +66,7 @@ Collector& collector() {
   return the_collector;
 }
 
-void write_line(int pipe, const std::string& line) {
+void write_line(int pipe, std::string_view line) {
   std::size_t done = 0;
   while (done < line.size()) {
     const ssize_t n = write(pipe, line.data() + done, line.size() - done);
@@ -221,6 +221,7 @@ void begin_run_record(const testing::TestInfo& test) {
   record.test = std::string(test.test_suite_name()) + "." + test.name();
   record.run = flags().run.value_or(0);
   record.seed = flags().seed + record.run;
+  if (leaves_run_record()) write_line(collector().pipe, kRunBegun);
 }
 
 void note_metric(std::string_view name, double value) {

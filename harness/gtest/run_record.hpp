@@ -22,7 +22,7 @@ namespace orrery {
 enum class RunOutcome : std::uint8_t {
   kPassed,
   kFailed,   // an assertion, or flight code crashed and the test did not allow it
-  kCrashed,  // the test program itself ended by a signal
+  kCrashed,  // the test program itself ended amid the test: by a signal, or a sanitizer's exit
   kTimeout,  // passed its time limit on the host
   kKilled,   // by a signal that others send: SIGKILL, SIGTERM ...
   kError     // ended without having run anything, or could not be started
@@ -79,6 +79,9 @@ void record_metric(std::string_view name_with_unit, double value);
 /// What parts of the harness and fixtures tell about the run that is going on; kept if this program
 /// is a child of a campaign, or not at all.
 namespace internal {
+
+/// What a child says first, on a line of its own: from here on its end is that of a run.
+constexpr std::string_view kRunBegun = "begun\n";
 
 /// Takes over the pipe that ORRERY_RUN_RECORD names. Init does it.
 void adopt_run_record();

@@ -46,7 +46,10 @@ TEST(Steady, MissesItsLimits) {
 // What fails or crashes is a datum: 7 of 10 pass.
 TEST(Mixed, IsJudgedAsAWhole) {
   const Campaign campaign = fly_campaign(Runs{10}, [](RunId run) {
-    if (run.index == 3) std::raise(SIGSEGV);
+    if (run.index == 3) {
+      std::signal(SIGSEGV, SIG_DFL);  // a sanitizer's handler would exit instead
+      std::raise(SIGSEGV);
+    }
     if (run.index % 4 != 1) record_metric("quarter_m", quarter(run));
     EXPECT_NE(run.index, 5u) << "run five";
     ASSERT_NE(run.index, 7u) << "run seven";
@@ -59,7 +62,7 @@ TEST(Mixed, IsJudgedAsAWhole) {
 }
 
 TEST(Host, AHangIsNoResult) {
-  fly_campaign(Runs{.n = 3, .time_limit = 300ms}, [](RunId run) {
+  fly_campaign(Runs{.n = 3, .time_limit = 3s}, [](RunId run) {
     if (run.index == 1) std::this_thread::sleep_for(std::chrono::seconds(60));
   });
 }
@@ -72,6 +75,13 @@ TEST(Host, AnEarlyExitIsNoResult) {
   fly_campaign(Runs{3}, [](RunId run) {
     if (run.index == 1) std::_Exit(0);
   });
+}
+TEST(Host, AnExitAmidTheTestIsACrash) {
+  const Campaign campaign = fly_campaign(Runs{3}, [](RunId run) {
+    if (run.index == 1) std::_Exit(99);
+  });
+  EXPECT_EQ(campaign.runs().at(1).outcome, RunOutcome::kCrashed);
+  EXPECT_EQ(campaign.runs().at(1).failure_site, "exit code 99 amid the test");
 }
 TEST(Host, ASkipIsNoResult) {
   fly_campaign(Runs{3}, [](RunId run) {
@@ -112,3 +122,13 @@ TEST_P(PlainTest, HasARun) {
   EXPECT_NE(GetParam().index, 2u);
 }
 INSTANTIATE_TEST_SUITE_P(Seeds, PlainTest, Seeds(4));
+
+// Something to interrupt: each run takes as long as the caller says.
+TEST(Slow, Sleeps) {
+  const Campaign campaign = fly_campaign(Runs{200}, [](RunId run) {
+    std::this_thread::sleep_for(
+        std::chrono::milliseconds(std::atoi(variable("CAMPAIGN_RUN_MS").c_str())));
+    record_metric("quarter_m", quarter(run));
+  });
+  EXPECT_THAT(campaign.passed(), PassRateAtLeast(0.9, 0.95));
+}

@@ -82,6 +82,10 @@ TEST(FlyCampaignTest, ARunWithoutAResultFailsIt) {
   }
 }
 
+TEST(FlyCampaignTest, AnExitAmidTheTestIsACrash) {
+  EXPECT_EQ(run("--gtest_filter=Host.AnExitAmidTheTestIsACrash").code, 0);
+}
+
 TEST(FlyCampaignTest, ASecondOneInATestIsRefused) {
   EXPECT_EQ(run("--gtest_filter=Twice.*").code, 0);
 }

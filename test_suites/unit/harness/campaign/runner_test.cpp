@@ -1,5 +1,7 @@
 // orrery-campaign run and accept, as programs.
+#include <orrery/harness/campaign/bisection.hpp>
 #include <orrery/harness/campaign/run_store.hpp>
+#include <orrery/harness/campaign/slurm_script.hpp>
 #include <orrery/harness/gtest/child_process.hpp>
 
 #include <gmock/gmock.h>
@@ -166,7 +168,7 @@ TEST_F(CampaignToolTest, StopsAtTheFirstFailure) {
 }
 
 TEST_F(CampaignToolTest, ATimeLimitCostsOneRun) {
-  const Ended ended = campaign(run("Host.AHangIsNoResult") + "--time-limit 0.5");
+  const Ended ended = campaign(run("Host.AHangIsNoResult") + "--time-limit 3");
   EXPECT_EQ(ended.code, 1);
   EXPECT_THAT(ended.output, AllOf(HasSubstr("passed 2, timeout 1"), HasSubstr("without a result")));
 }
@@ -179,6 +181,49 @@ TEST_F(CampaignToolTest, SaysWhatIsWrongWithItsArguments) {
     EXPECT_EQ(campaign(arguments).code, 2) << arguments;
   }
   EXPECT_THAT(campaign("run /nowhere/x --filter A.B").output, HasSubstr("/nowhere/x"));
+}
+
+// 200 runs of 0.3 s are 60 s: one task of a minute, two on half of it; never more than runs.
+TEST(SlurmTasksTest, AreSizedByTheTimeOfARun) {
+  CampaignOptions options;
+  EXPECT_EQ(slurm_tasks(options, 200, 0.3), 1u);
+  options.chunk = 30s;
+  EXPECT_EQ(slurm_tasks(options, 200, 0.3), 2u);
+  options.processors = 2;
+  EXPECT_EQ(slurm_tasks(options, 200, 0.3), 1u);
+  EXPECT_EQ(slurm_tasks(options, 3, 1e6), 3u);
+  EXPECT_EQ(slurm_tasks(options, 9999999, 100), 10000u);
+}
+
+TEST_F(CampaignToolTest, WritesAJobArrayThatMayBeRequeued) {
+  const Ended ended = campaign("submit --slurm " CAMPAIGN_PROGRAM
+                               " --filter Many.Empty --runs 50 --dry-run --chunk 0.05 --out " +
+                               out());
+  EXPECT_EQ(ended.code, 0) << ended.output;
+  EXPECT_EQ(read_runs(out()).runs.size(), 3u) << "what was measured counts";
+  std::ifstream in(out() + "/campaign.slurm");
+  const std::string script{std::istreambuf_iterator<char>(in), {}};
+  EXPECT_THAT(script, AllOf(HasSubstr("#SBATCH --requeue"), HasSubstr("#SBATCH --open-mode=append"),
+                            HasSubstr("#SBATCH --array=1-"), HasSubstr("--resume")));
+  // A task of it, as Slurm would start it, twice: the second finds nothing left.
+  for (int twice = 0; twice < 2; ++twice) {
+    EXPECT_EQ(shell("SLURM_ARRAY_TASK_ID=1 bash " + out() + "/campaign.slurm").code, 0);
+  }
+  const std::size_t lines = lines_in(out());
+  EXPECT_GT(lines, 3u);
+  EXPECT_EQ(lines, read_runs(out()).runs.size());
+}
+
+TEST(BisectTest, FindsTheThreshold) {
+  const auto above = [](double x) { return x > 2.625; };
+  const Threshold t = bisect(0, 10, 1e-9, above);
+  EXPECT_LE(t.passes, 2.625);
+  EXPECT_GT(t.fails, 2.625);
+  EXPECT_LE(t.fails - t.passes, 1e-9);
+  EXPECT_LE(t.runs, 34);  // log2(1e10)
+  // To neighbouring doubles, in the other direction.
+  const Threshold to_bits = bisect(10, 0, 0, [](double x) { return x <= 2.625; });
+  EXPECT_EQ(to_bits.fails, 2.625);
 }
 
 // Three hosts without a common disk: their folders become one, which is judged and reported.
@@ -204,7 +249,7 @@ TEST_F(CampaignToolTest, MergesFoldersOfOneCampaign) {
 TEST_F(CampaignToolTest, AKillLosesTheRunsInFlightAndNoMore) {
   constexpr std::uint32_t kRuns = 40;
   const char* asked = std::getenv("ORRERY_KILLS");
-  const int kills = asked == nullptr ? 8 : std::atoi(asked);
+  const int kills = asked == nullptr ? 5 : std::atoi(asked);
   const std::string flags = "-j2 --runs " + std::to_string(kRuns) + " ";
   campaign(run("Many.Empty", "whole") + flags);
   const std::string whole = results_in(out("whole"));
