@@ -165,7 +165,8 @@ std::string campaign_usage() {
       a time (one per processor). N is what the test's Runs{n} says, if it has one. A line of JSON per
       run goes to DIR (campaign). Then the test judges the whole, where it calls fly_campaign().
       --shard i/n       only these; accept DIR judges when all shards are done
-      --resume          fly what is missing     --retry-failed  fly again what did not pass
+      --resume          fly what is missing or was killed
+      --retry-failed    fly again what did not pass
       --until-failure   stop at the first failure; without --runs, go on until there is one
       --time-limit S    of each run on the host (600)
       --data FILE       a file that runs read: results count as long as it stays the same

@@ -185,10 +185,13 @@ class Runner {
     for (std::uint32_t run = 0; run < manifest_.runs; ++run) {
       if (!is_ours(run)) continue;
       const auto found = merged_.runs.find(run);
-      const bool missing = found == merged_.runs.end();
+      // Whoever ended a killed run, a scheduler perhaps, it had no chance.
+      const bool missing =
+          found == merged_.runs.end() || found->second.outcome == RunOutcome::kKilled;
+      const bool did_not_pass =
+          found != merged_.runs.end() && found->second.outcome != RunOutcome::kPassed;
       const bool flies =
-          missing ? options_.resume || !had_ours_
-                  : options_.retry_failed && found->second.outcome != RunOutcome::kPassed;
+          (missing && (options_.resume || !had_ours_)) || (did_not_pass && options_.retry_failed);
       if (flies) todo_.push_back(run);
     }
     if (options_.pilot > 0 && todo_.size() > options_.pilot) todo_.resize(options_.pilot);

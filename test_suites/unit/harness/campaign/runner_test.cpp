@@ -119,6 +119,12 @@ TEST_F(CampaignToolTest, ResumesWhatIsMissingAndNothingElse) {
   EXPECT_EQ(read_runs(out()).runs.size(), 9u);
 }
 
+TEST_F(CampaignToolTest, ResumesWhatOthersHaveKilled) {
+  campaign(run("Host.AKillIsNoResult"));
+  EXPECT_EQ(campaign(run("Host.AKillIsNoResult") + "--resume").code, 1);
+  EXPECT_EQ(lines_in(out()), 4u) << "run 1, which is killed again";
+}
+
 TEST_F(CampaignToolTest, AFailureStaysOneWhenItIsRetried) {
   campaign(run("Mixed.IsJudgedAsAWhole"));
   const std::string before = results_in(out());

@@ -83,5 +83,20 @@ TEST(FlagsTest, TargetsNameProcessesAndTheWayThere) {
   }
 }
 
+TEST(FlagsTest, ThoseOfCampaigns) {
+  const Flags f = parse_flags({"--orrery_run=17", "--orrery_jobs=4", "--orrery_campaign=out",
+                               "--orrery_set=deputy/mass_kg=11.5", "--orrery_set=a=b=-1e3"},
+                              {});
+  EXPECT_EQ(f.run, 17u);
+  EXPECT_EQ(f.jobs, 4);
+  EXPECT_EQ(f.campaign, "out");
+  EXPECT_EQ(f.set.at("deputy/mass_kg"), 11.5);
+  EXPECT_EQ(f.set.at("a=b"), -1000);
+  for (const char* bad :
+       {"--orrery_run=-1", "--orrery_jobs=0", "--orrery_set=x", "--orrery_set=x=1y"}) {
+    EXPECT_THROW(parse_flags({bad}, {}), std::invalid_argument) << bad;
+  }
+}
+
 }  // namespace
 }  // namespace orrery
