@@ -282,9 +282,11 @@ FileView::Result FileServices::control(int fd, int command, long argument) {
   OpenFile& file = *found->second.file;
   switch (command) {
     case F_DUPFD:
-    case F_DUPFD_CLOEXEC:
-      if (argument < 0 || argument >= kEnd) return -EINVAL;
-      return duplicate(fd, static_cast<int>(argument), command == F_DUPFD_CLOEXEC);
+    case F_DUPFD_CLOEXEC: {
+      const int at_least = static_cast<int>(argument);  // the upper half may hold anything
+      if (at_least < 0 || at_least >= kEnd) return -EINVAL;
+      return duplicate(fd, at_least, command == F_DUPFD_CLOEXEC);
+    }
     case F_GETFD:
       return found->second.flags;
     case F_SETFD:
