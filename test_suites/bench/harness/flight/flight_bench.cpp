@@ -2,6 +2,8 @@
 
 #include <orrery/harness/flight/containment.hpp>
 #include <orrery/harness/flight/flight_computer.hpp>
+#include <orrery/harness/flight/flight_stack.hpp>
+#include <orrery/harness/heap/simulated_heap.hpp>
 
 #include <benchmark/benchmark.h>
 
@@ -42,6 +44,21 @@ void BM_Boundary_ContainedCall(benchmark::State& state) {
   benchmark::DoNotOptimize(count);
 }
 BENCHMARK(BM_Boundary_ContainedCall);
+
+// As a process has it: heap, stack and limit of host time of its own.
+void BM_Boundary_ContainedCallOfAProcess(benchmark::State& state) {
+  SimulatedHeap heap({.limit_bytes = 1 << 20});
+  internal::FlightStack stack(1 << 20);
+  internal::ContainedProcess process;
+  if (heap_simulation_available()) process.heap = &heap;
+  if (internal::FlightStack::available()) process.stack = &stack;
+  process.host_limit_ns = 10'000'000'000;
+  internal::CrashCapture capture;
+  std::uint64_t count = 0;
+  for (auto _ : state) internal::run_contained(process, nothing, &count, capture);
+  benchmark::DoNotOptimize(count);
+}
+BENCHMARK(BM_Boundary_ContainedCallOfAProcess);
 
 void BM_FlightProcess_InputAndOutput(benchmark::State& state) {
   FlightProcess process(subject());
