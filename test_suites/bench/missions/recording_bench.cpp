@@ -41,19 +41,40 @@ double fly(bool record, Duration span, Duration receiver_period) {
   return cpu_s() - begin_s;
 }
 
-std::filesystem::path scratch_folder() {
-  std::string pattern = (std::filesystem::temp_directory_path() / "orrery_bench_XXXXXX").string();
-  return mkdtemp(pattern.data());
+/// One for the program, since the setting is read once.
+class ScratchFolder {
+ public:
+  ScratchFolder() {
+    std::string pattern = (std::filesystem::temp_directory_path() / "orrery_bench_XXXXXX").string();
+    path_ = mkdtemp(pattern.data());
+    setenv("ORRERY_OUT", path_.c_str(), 1);
+  }
+  ~ScratchFolder() { std::filesystem::remove_all(path_); }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+  void clear() const {
+    for (const auto& entry : std::filesystem::directory_iterator(path_)) {
+      std::filesystem::remove_all(entry.path());
+    }
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+const ScratchFolder& scratch_folder() {
+  static const ScratchFolder folder;
+  return folder;
 }
 
 void BM_RecordingAtOneHertz(benchmark::State& state) {
-  const std::filesystem::path out = scratch_folder();
-  setenv("ORRERY_OUT", out.c_str(), 1);  // before flags() is first asked
+  const ScratchFolder& out = scratch_folder();
   double off_s = 0, on_s = 0;
   for (auto _ : state) {
     off_s += fly(false, state.range(0) * 1h, state.range(1) * 1s);
     on_s += fly(true, state.range(0) * 1h, state.range(1) * 1s);
-    std::filesystem::remove_all(out);
+    out.clear();
   }
   const double runs = static_cast<double>(state.iterations());
   state.counters["off_s"] = off_s / runs;
@@ -88,8 +109,7 @@ BENCHMARK(BM_RecorderOff);
 
 // What is left to do when a run of 50 h ends: digest, report.html, summary, index.
 void BM_FilesOfALongRun(benchmark::State& state) {
-  const std::filesystem::path out = scratch_folder();
-  setenv("ORRERY_OUT", out.c_str(), 1);
+  const ScratchFolder& out = scratch_folder();
   double end_s = 0, bytes = 0;
   for (auto _ : state) {
     FormationOptions options;
@@ -100,10 +120,10 @@ void BM_FilesOfALongRun(benchmark::State& state) {
     const double begin_s = cpu_s();
     world.reset();
     end_s += cpu_s() - begin_s;
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(out)) {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(out.path())) {
       if (entry.path().filename() == "report.html") bytes += static_cast<double>(entry.file_size());
     }
-    std::filesystem::remove_all(out);
+    out.clear();
   }
   const double runs = static_cast<double>(state.iterations());
   state.counters["end_s"] = end_s / runs;
