@@ -95,7 +95,6 @@ FormationGnc::FormationGnc(Outputs& outputs, const Configuration& configuration,
                boot.now_ns),
       maneuvers_(gravity_, configuration.maneuvers),
       scale_(configuration.maneuvers.errors),
-      boot_ns_(boot.now_ns),
       delta_v_mps_(loaded_delta_v(outputs)) {
   maneuvers_.enter(mission_.protocol().record().current);
   ask_receiver(boot.now_ns);

@@ -138,7 +138,6 @@ class FormationGnc {
   Watched watched_;
   SeparationForecast forecast_;
 
-  std::int64_t boot_ns_;
   std::int64_t last_epoch_ns_ = 0;
   std::int64_t last_range_ns_ = 0;  // GPS; of the receiver's epochs with observations
   std::int64_t asked_ns_ = 0;
