@@ -40,6 +40,7 @@
 #ifndef FORMATION_GNC_MESSAGES_H
 #define FORMATION_GNC_MESSAGES_H
 
+#include "orrery_crc32.h"
 #include "orrery_messages.h"
 
 #define FORMATION_GNC_VERSION 1u
@@ -112,16 +113,6 @@ typedef struct formation_gnc_measurement {
   formation_gnc_satellite satellite[FORMATION_GNC_SATELLITES];
 } formation_gnc_measurement;
 
-ORRERY_MAYBE_UNUSED static uint32_t formation_gnc_crc32(const unsigned char* data, uint32_t bytes) {
-  uint32_t crc = 0xFFFFFFFFu, k;
-  int bit;
-  for (k = 0; k < bytes; k++) {
-    crc ^= data[k];
-    for (bit = 0; bit < 8; bit++) crc = (crc >> 1) ^ ((crc & 1u) ? 0xEDB88320u : 0u);
-  }
-  return crc ^ 0xFFFFFFFFu;
-}
-
 ORRERY_MAYBE_UNUSED static void formation_gnc_put_u16(unsigned char* at, unsigned value) {
   at[0] = (unsigned char)(value & 0xFFu);
   at[1] = (unsigned char)((value >> 8) & 0xFFu);
@@ -153,13 +144,13 @@ ORRERY_MAYBE_UNUSED static void formation_gnc_begin(unsigned char* message, unsi
 }
 
 ORRERY_MAYBE_UNUSED static void formation_gnc_seal(unsigned char* message, uint32_t bytes) {
-  orrery_put_u32(message + bytes - 4, formation_gnc_crc32(message, bytes - 4));
+  orrery_put_u32(message + bytes - 4, orrery_crc32(message, bytes - 4));
 }
 
 ORRERY_MAYBE_UNUSED static int formation_gnc_is_sound(const unsigned char* message, uint32_t bytes,
                                                       unsigned magic) {
   return formation_gnc_get_u16(message) == magic && message[2] == FORMATION_GNC_VERSION &&
-         orrery_get_u32(message + bytes - 4) == formation_gnc_crc32(message, bytes - 4);
+         orrery_get_u32(message + bytes - 4) == orrery_crc32(message, bytes - 4);
 }
 
 ORRERY_MAYBE_UNUSED static void formation_gnc_put_command(unsigned char* message,

@@ -1,8 +1,8 @@
 #include "configuration.hpp"
 
-#include <cstdio>
-#include <cstdlib>
 #include <cstring>
+
+#include "support/configuration_reader.hpp"
 
 namespace formation_keeping {
 
@@ -10,58 +10,13 @@ using namespace flight_support;
 
 namespace {
 
-constexpr std::size_t kMaxLine = 128;
-
-// A number of the configuration: where it goes and what it may be.
-struct NumberKey {
-  const char* name;
-  double* value;
-  double low, high;
-};
-
-bool is_space(char c) {
-  return c == ' ' || c == '\t' || c == '\r';
-}
-
-// Cuts off comment and white space at both ends, in place.
-char* trimmed(char* line) {
-  char* comment = std::strchr(line, '#');
-  if (comment != nullptr) *comment = '\0';
-  while (is_space(*line)) ++line;
-  std::size_t length = std::strlen(line);
-  while (length > 0 && is_space(line[length - 1])) line[--length] = '\0';
-  return line;
-}
-
-// A decimal number in the C locale, which flight programs never leave, and nothing behind it.
-bool read_number(const char* text, double* value) {
-  char* end = nullptr;
-  *value = std::strtod(text, &end);
-  return end != text && *end == '\0';
-}
-
-class Reader {
+class Reader final : public flight_support::ConfigurationReader {
  public:
   Reader(Configuration* c, char* message, std::size_t message_bytes)
-      : configuration_(c), message_(message), message_bytes_(message_bytes) {}
-
-  bool read_line(char* line) {
-    ++line_;
-    char* key = trimmed(line);
-    if (*key == '\0') return true;
-    char* equals = std::strchr(key, '=');
-    if (equals == nullptr) return fail(key, "has no '='");
-    *equals = '\0';
-    return set(trimmed(key), trimmed(equals + 1));
-  }
-
-  bool fail(const char* what, const char* why) {
-    std::snprintf(message_, message_bytes_, "configuration line %d: '%s' %s", line_, what, why);
-    return false;
-  }
+      : ConfigurationReader(message, message_bytes), configuration_(c) {}
 
  private:
-  bool set(const char* key, const char* value) {
+  bool set(const char* key, const char* value) override {
     if (std::strcmp(key, "role") == 0) return set_role(value);
     NavigationOptions& navigation = configuration_->navigation;
     PlannerOptions& planner = configuration_->planner;
@@ -108,27 +63,8 @@ class Reader {
     return true;
   }
 
-  bool set_number(const NumberKey& key, std::uint32_t bit, const char* text) {
-    if ((seen_ & bit) != 0) return fail(key.name, "is given twice");
-    seen_ |= bit;
-    double value = 0.0;
-    // Written so that a NaN is out of range.
-    if (!read_number(text, &value) || !(value >= key.low && value <= key.high)) {
-      char why[96];
-      std::snprintf(why, sizeof why, "is not a number in [%g, %g]: '%.32s'", key.low, key.high,
-                    text);
-      return fail(key.name, why);
-    }
-    *key.value = value;
-    return true;
-  }
-
   Configuration* configuration_;
-  char* message_;
-  std::size_t message_bytes_;
-  int line_ = 0;
   bool role_seen_ = false;
-  std::uint32_t seen_ = 0;
 };
 
 }  // namespace
@@ -137,19 +73,7 @@ bool parse_configuration(const char* text, std::size_t bytes, Configuration* con
                          char* message, std::size_t message_bytes) {
   *configuration = Configuration();
   Reader reader(configuration, message, message_bytes);
-  std::size_t at = 0;
-  while (at < bytes) {
-    char line[kMaxLine];
-    std::size_t length = 0;
-    for (; at < bytes && text[at] != '\n'; ++at) {
-      if (length + 1 == kMaxLine) return reader.fail("(a line)", "is longer than 127 characters");
-      line[length++] = text[at];
-    }
-    ++at;
-    line[length] = '\0';
-    if (!reader.read_line(line)) return false;
-  }
-  return true;
+  return reader.read(text, bytes);
 }
 
 }  // namespace formation_keeping

@@ -18,6 +18,7 @@
 #ifndef FORMATION_KEEPING_MESSAGES_H
 #define FORMATION_KEEPING_MESSAGES_H
 
+#include "orrery_crc32.h"
 #include "orrery_messages.h"
 
 #define FORMATION_COMMAND_BYTES 61u
@@ -42,22 +43,12 @@ typedef struct formation_telemetry {
   uint32_t burns, updates, outliers, rejected;
 } formation_telemetry;
 
-ORRERY_MAYBE_UNUSED static uint32_t formation_crc32(const unsigned char* data, uint32_t bytes) {
-  uint32_t crc = 0xFFFFFFFFu, k;
-  int bit;
-  for (k = 0; k < bytes; k++) {
-    crc ^= data[k];
-    for (bit = 0; bit < 8; bit++) crc = (crc >> 1) ^ ((crc & 1u) ? 0xEDB88320u : 0u);
-  }
-  return crc ^ 0xFFFFFFFFu;
-}
-
 ORRERY_MAYBE_UNUSED static void formation_put_command(unsigned char* message, unsigned opcode,
                                                       const double a_roe_m[6], int64_t end_ns) {
   message[0] = (unsigned char)(opcode & 0xFFu);
   orrery_put_f64s(message + 1, a_roe_m, 6);
   orrery_put_i64(message + 49, end_ns);
-  orrery_put_u32(message + 57, formation_crc32(message, 57));
+  orrery_put_u32(message + 57, orrery_crc32(message, 57));
 }
 
 /* 1 if the length and the CRC are right; otherwise 0, and nothing is written. */
@@ -65,7 +56,7 @@ ORRERY_MAYBE_UNUSED static int formation_get_command(const unsigned char* messag
                                                      unsigned* opcode, double a_roe_m[6],
                                                      int64_t* end_ns) {
   if (bytes != FORMATION_COMMAND_BYTES) return 0;
-  if (orrery_get_u32(message + 57) != formation_crc32(message, 57)) return 0;
+  if (orrery_get_u32(message + 57) != orrery_crc32(message, 57)) return 0;
   *opcode = message[0];
   orrery_get_f64s(message + 1, a_roe_m, 6);
   *end_ns = orrery_get_i64(message + 49);

@@ -124,7 +124,7 @@ TEST_F(CrosslinkProtocolTest, TheSequenceWraps) {
   const auto with_sequence = [&](std::uint32_t sequence) {
     Message message = sent[0];
     orrery_put_u32(message.data() + 8, sequence);
-    orrery_put_u32(message.data() + 84, formation_crc32(message.data(), 84));
+    orrery_put_u32(message.data() + 84, orrery_crc32(message.data(), 84));
     return receiver.receive(message.data(), kCrosslinkBytes);
   };
   EXPECT_EQ(with_sequence(0xFFFFFFFEu), Verdict::kAccepted);
