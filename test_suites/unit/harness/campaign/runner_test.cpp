@@ -203,7 +203,7 @@ TEST(SlurmTasksTest, AreSizedByTheTimeOfARun) {
 
 TEST_F(CampaignToolTest, WritesAJobArrayThatMayBeRequeued) {
   const Ended ended = campaign("submit --slurm " CAMPAIGN_PROGRAM
-                               " --filter Many.Empty --runs 50 --dry-run --chunk 0.05 --out " +
+                               " --filter Many.Empty --runs 50 --dry-run --chunk 1 --out " +
                                out());
   EXPECT_EQ(ended.code, 0) << ended.output;
   EXPECT_EQ(read_runs(out()).runs.size(), 3u) << "what was measured counts";
