@@ -7,7 +7,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <orrery_flight.h>
 #include <string>
 #include <string_view>
 #include <utility>
