@@ -1,7 +1,9 @@
 # Flight libraries for other processors, from the sources of those for this one: what
 # orrery_add_flight_library(... CROSS armhf armel arm64) builds with Debian's cross compilers. Where one is
 # missing it says so and leaves that processor out; a test that asks for it is told the package's name.
+# With ORRERY_CROSS off nothing is built for other processors.
 include_guard(GLOBAL)
+option(ORRERY_CROSS "Build flight libraries for the processors that they name, too" ON)
 
 #   armhf  ARMv7 with VFP       armel  ARMv5T, soft float: also for an ARM1176       arm64  ARMv8
 set(orrery_cross_triplet_armhf arm-linux-gnueabihf)
@@ -11,6 +13,9 @@ set(orrery_cross_triplet_arm64 aarch64-linux-gnu)
 # lib<name>.<processor>.so beside lib<name>.so, and the host program that serves it. Static libraries of
 # the same build that the library links are compiled in from their sources.
 function(orrery_cross_build name)
+  if(NOT ORRERY_CROSS)
+    return()
+  endif()
   foreach(processor IN LISTS ARGN)
     if(NOT DEFINED orrery_cross_triplet_${processor})
       message(FATAL_ERROR "orrery_add_flight_library(${name}): CROSS ${processor} is not known; "

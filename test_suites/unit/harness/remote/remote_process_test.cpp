@@ -120,7 +120,7 @@ std::string missing_for(const TargetAddress& emulator) {
   try {
     find_flight_library(library);
   } catch (const std::invalid_argument&) {
-    return library + " was not built: its cross compiler was missing";
+    return library + " was not built: no cross compiler, or ORRERY_CROSS is off";
   }
   return "";
 }
