@@ -189,6 +189,18 @@ function(orrery_discover_tests name labels timeout)
   endif()
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
     NO_PRETTY_TYPES NO_PRETTY_VALUES TEST_LIST ${name}_tests ${properties})
+  # LeakSanitizer's own tracer can crash when the program is over and the test has passed: seen with one
+  # test that unloads libraries with thread-local storage, in some environments. That is no leak and no
+  # failure; it counts as skipped, where it can be seen.
+  if(ORRERY_SANITIZE MATCHES address)
+    set(file ${CMAKE_CURRENT_BINARY_DIR}/${name}_tracer.cmake)
+    file(WRITE ${file} "if(${name}_tests)
+  set_tests_properties(\${${name}_tests} PROPERTIES
+    SKIP_REGULAR_EXPRESSION \"PASSED  . 1 test..Tracer caught signal\")
+endif()
+")
+    set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${file})
+  endif()
   if(labels)
     set(file ${CMAKE_CURRENT_BINARY_DIR}/${name}_labels.cmake)
     file(WRITE ${file} "if(${name}_tests)
