@@ -21,7 +21,8 @@
 /* No payload is larger, whatever the other side says. */
 #define ORRERY_WIRE_MOST_BYTES 0x4000000u
 
-/* clang-format off: a table */
+/* A table: */
+/* clang-format off */
 enum {
   /* simulation -> target           time_ns          code         payload                            */
   ORRERY_W_CREATE = 1,           /* now              reset cause  fields, see ORRERY_WT_             */
@@ -36,7 +37,7 @@ enum {
   ORRERY_W_OUTPUT = 17,          /* 0                port         message                            */
   ORRERY_W_LOG = 18,             /* 0                level        text                               */
   ORRERY_W_NV_STORE = 19,        /* 0                slot         bytes                              */
-  ORRERY_W_DONE = 20             /* pending tick,    status       u32 unit of cost | u64 cost        
+  ORRERY_W_DONE = 20             /* pending tick,    status       u32 unit of cost | u64 cost
                                     or -1                         | u64 heap now | u64 heap peak
                                                                   | u32 0 or 1: the call asked for a tick */
 };
@@ -58,8 +59,8 @@ extern "C" {
 #endif
 
 typedef struct orrery_wire_cost {
-  uint32_t unit; /* ORRERY_WU_ */
-  uint64_t cost; /* of the call */
+  uint32_t unit;                /* ORRERY_WU_ */
+  uint64_t cost;                /* of the call */
   uint64_t heap_now, heap_peak; /* bytes; 0: not measured */
 } orrery_wire_cost;
 
@@ -76,9 +77,9 @@ typedef struct orrery_wire_link { /* what a board supplies */
 /* Bytes of work[] that orrery_wire_serve needs beside inputs, boot record and stored slots. */
 #define ORRERY_WIRE_WORK_BYTES 16384u
 
-/* Says HELLO and serves until DESTROY. Half of work[] beyond ORRERY_WIRE_WORK_BYTES holds the request,
- * half the slots. ORRERY_OK after DESTROY; ORRERY_REJECTED: the link broke, or what came over it was
- * none of the above; ORRERY_TOO_SMALL: work[] is too small for the port table. */
+/* Says HELLO and serves until DESTROY. Half of work[] beyond ORRERY_WIRE_WORK_BYTES holds the
+ * request, half the slots. ORRERY_OK after DESTROY; ORRERY_REJECTED: the link broke, or what came
+ * over it was none of the above; ORRERY_TOO_SMALL: work[] is too small for the port table. */
 int32_t orrery_wire_serve(const orrery_wire_link* link, const orrery_flight* flight, void* work,
                           uint32_t work_bytes);
 

@@ -82,9 +82,9 @@ class FlightProcess::Impl {
   internal::VirtualServices services{options};
   std::shared_ptr<NonVolatileMemory> memory;
   internal::FileServices files;
-  std::unique_ptr<FlightLibrary> library;  // unloaded while all of the above is still there
+  std::unique_ptr<FlightLibrary> library;          // unloaded while all of the above is still there
   std::unique_ptr<internal::FlightTarget> target;  // in place of the library
-  orrery_work* work = nullptr;             // of the library; null: it counts none
+  orrery_work* work = nullptr;                     // of the library; null: it counts none
 
   std::vector<internal::GlobalsWatch> globals;    // Isolation::kShared; the library's own first
   std::vector<std::string> watched_dependencies;  // names of the others

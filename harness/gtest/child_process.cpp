@@ -38,8 +38,9 @@ void turn_address_randomisation_round() {
 }
 
 // In the child, between fork and exec: nothing that allocates.
-[[noreturn]] void become(const char* program, const std::vector<char*>& arguments, const std::vector<char*>& environment,
-                         int output, pid_t parent, bool other_addresses) {
+[[noreturn]] void become(const char* program, const std::vector<char*>& arguments,
+                         const std::vector<char*>& environment, int output, pid_t parent,
+                         bool other_addresses) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(127);  // it died before the call
   dup2(output, STDOUT_FILENO);

@@ -24,7 +24,8 @@ std::string file_name_of(std::string_view channel) {
   std::replace(name.begin(), name.end(), '/', '.');
   std::replace_if(
       name.begin(), name.end(), [](char c) { return !is_kept(c); }, '_');
-  if (name.empty() || name.front() == '.') name.insert(name.begin(), '_');  // neither hidden nor a folder
+  if (name.empty() || name.front() == '.')
+    name.insert(name.begin(), '_');  // neither hidden nor a folder
   return name;
 }
 

@@ -72,8 +72,8 @@ TEST(EarthRotationTest, AgreesWithErfaFrom2016To2030) {
   EXPECT_LT(worst_rad, 0.1 * kArcsec_rad) << worst_rad / kArcsec_rad << " arcsec";
 }
 
-// With what IAU 1976/1980 is off by now (celestial pole offsets up to 0.12") and the frame bias (0.02") left out, which
-// today's models contain. Observed 0.068 arcsec.
+// With what IAU 1976/1980 is off by now (celestial pole offsets up to 0.12") and the frame bias
+// (0.02") left out, which today's models contain. Observed 0.068 arcsec.
 TEST(EarthRotationTest, AgreesWithTodaysModelsFrom2016To2030) {
   const double worst_rad = worst_from_2016_to_2030_rad(erfa_icrs_to_ecef);
   RecordProperty("worst_arcsec", std::to_string(worst_rad / kArcsec_rad));
