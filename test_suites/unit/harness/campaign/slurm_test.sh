@@ -62,8 +62,8 @@ JobCompType=jobcomp/filetxt
 JobCompLoc=$dir/jobcomp.log
 MpiDefault=none
 ReturnToService=2
-SlurmdTimeout=20
-SlurmctldTimeout=20
+SlurmdTimeout=120
+SlurmctldTimeout=120
 MinJobAge=3600
 MaxArraySize=10001
 MaxJobCount=20000
@@ -85,11 +85,11 @@ done
 [ "$(sinfo -h -o %T -N 2>/dev/null | grep -c idle)" = 2 ] ||
   skip "the nodes do not come up here: $(tail -1 "$dir/slurmctld.log")"
 
-# Each run takes 0.2 s, so that there is a midway.
-export CAMPAIGN_RUN_MS=200
-"$tool" run "$program" --filter Slow.Sleeps --runs "$runs" -j2 --out "$dir/local" >"$dir/local.log" ||
-  fail "the local campaign: $(cat "$dir/local.log")"
-"$tool" submit --slurm "$program" --filter Slow.Sleeps --runs "$runs" --out "$dir/cluster" --chunk 5 ||
+# Each run sleeps for 0.05 s, so that there is a midway. The local campaign is flown meanwhile.
+export CAMPAIGN_RUN_MS=50
+"$tool" run "$program" --filter Slow.Sleeps --runs "$runs" -j2 --out "$dir/local" >"$dir/local.log" &
+local_campaign=$!
+"$tool" submit --slurm "$program" --filter Slow.Sleeps --runs "$runs" --out "$dir/cluster" --chunk 1 ||
   fail "submit"
 echo "queued: $(squeue -h -r | wc -l) tasks"
 
@@ -111,13 +111,18 @@ for step in $steps; do
 done
 kill -9 "$daemon" $victims
 echo "node n1 killed after $done_runs runs: slurmd $daemon, and$victims"
+# Slurm is told, as a health check would: it would see it after SlurmdTimeout, which is long here lest a
+# busy machine is taken for a dead node.
+scontrol update nodename=n1 state=down reason=killed || fail "scontrol"
 
-for _ in $(seq 500); do
+for _ in $(seq 1000); do
   [ "$(squeue -h | wc -l)" = 0 ] && break
-  sleep 1
+  sleep 0.5
 done
 squeue -h | grep -q . && fail "jobs are left after 500 s: $(squeue)"
 
+wait $local_campaign || fail "the local campaign: $(cat "$dir/local.log")"
+grep -q "Requeuing" "$dir/slurmctld.log" || fail "no task was begun anew"
 cat "$dir/cluster/accept.log"
 grep -q "PASSED" "$dir/cluster/accept.log" || fail "the verdict on the cluster"
 for where in local cluster; do
