@@ -34,3 +34,16 @@ macro(orrery_find_sundials how)
     find_package(SUNDIALS 6.4 ${how} COMPONENTS arkode nvecserial)
   endif()
 endmacro()
+
+# OpenCV for tests, as the target orrery_opencv_calib3d: Debian's packages of single modules have no CMake
+# package. Nothing where it is absent.
+macro(orrery_find_opencv_calib3d)
+  find_path(OPENCV4_INCLUDE_DIR opencv2/calib3d.hpp PATH_SUFFIXES opencv4)
+  find_library(OPENCV_CALIB3D_LIBRARY opencv_calib3d)
+  find_library(OPENCV_CORE_LIBRARY opencv_core)
+  if(NOT TARGET orrery_opencv_calib3d AND OPENCV4_INCLUDE_DIR AND OPENCV_CALIB3D_LIBRARY AND OPENCV_CORE_LIBRARY)
+    add_library(orrery_opencv_calib3d INTERFACE)
+    target_include_directories(orrery_opencv_calib3d SYSTEM INTERFACE ${OPENCV4_INCLUDE_DIR})
+    target_link_libraries(orrery_opencv_calib3d INTERFACE ${OPENCV_CALIB3D_LIBRARY} ${OPENCV_CORE_LIBRARY})
+  endif()
+endmacro()

@@ -16,6 +16,15 @@
  *                     deputy relative to chief in the chief's RTN, derivative taken in RTN,
  *                     whichever spacecraft sends it
  *   observation       0 i64 begin_ns | 8 i64 end_ns                              flight -> test
+ *   image             0 u32 frame | 4 u16 width | 6 u16 height | 8 u16 first_row   device -> flight
+ *                     | 10 u16 rows | 12 u8 bits | 13 u8 0 | 14 u16 0
+ *                     | 16 i64 exposure_begin_ns, of the first row of the frame
+ *                     | 24 f64 exposure_s | 32 f64 row_period_s, 0: global shutter
+ *                     | 40 f64 gain electrons/DN | 48 f64 offset DN
+ *                     | 56 f64 fx, fy, cx, cy px, k1, k2, p1, p2, k3 (OpenCV's order; (0, 0) is
+ *                     the centre of the first pixel), as calibrated on the ground
+ *                     | 128 u16 pixels DN, row by row; v down from first_row, u to the right
+ *   expose            0 i64 begin_ns | 8 f64 exposure_s, 0: as configured        flight -> device
  *   mode              0 i64 t_ns | 8 u32 mode, the package's own number          flight -> test
  *   command           the team's own bytes, exactly as the ground sent them      device -> flight
  */
@@ -32,6 +41,8 @@
 #define ORRERY_ESTIMATE_BYTES 104u
 #define ORRERY_OBSERVATION_BYTES 16u
 #define ORRERY_MODE_BYTES 12u
+#define ORRERY_IMAGE_HEADER_BYTES 128u /* 2 bytes per pixel follow */
+#define ORRERY_EXPOSE_BYTES 16u
 
 #if defined(__GNUC__)
 #define ORRERY_MAYBE_UNUSED __attribute__((unused))
@@ -49,6 +60,15 @@ ORRERY_MAYBE_UNUSED static uint32_t orrery_get_u32(const unsigned char* at) {
   int i;
   for (i = 3; i >= 0; i--) value = (value << 8) | at[i];
   return value;
+}
+
+ORRERY_MAYBE_UNUSED static void orrery_put_u16(unsigned char* at, unsigned value) {
+  at[0] = (unsigned char)(value & 0xFFu);
+  at[1] = (unsigned char)((value >> 8) & 0xFFu);
+}
+
+ORRERY_MAYBE_UNUSED static unsigned orrery_get_u16(const unsigned char* at) {
+  return (unsigned)at[0] | ((unsigned)at[1] << 8);
 }
 
 ORRERY_MAYBE_UNUSED static void orrery_put_i64(unsigned char* at, int64_t value) {
@@ -181,6 +201,73 @@ ORRERY_MAYBE_UNUSED static void orrery_get_mode(const unsigned char* message, in
                                                 uint32_t* mode) {
   *t_ns = orrery_get_i64(message);
   *mode = orrery_get_u32(message + 8);
+}
+
+/* What stands before the pixels of an image, or of a band of its rows. */
+struct orrery_image {
+  uint32_t frame; /* counts exposures since power-on, from 1; a lost one leaves a gap */
+  unsigned width, height, first_row, rows;
+  unsigned bits;
+  int64_t exposure_begin_ns;
+  double exposure_s, row_period_s;
+  double gain, offset;
+  double fx_fy_cx_cy[4], k1_k2_p1_p2_k3[5];
+};
+
+ORRERY_MAYBE_UNUSED static void orrery_put_image_header(unsigned char* message,
+                                                        const struct orrery_image* image) {
+  orrery_put_u32(message, image->frame);
+  orrery_put_u16(message + 4, image->width);
+  orrery_put_u16(message + 6, image->height);
+  orrery_put_u16(message + 8, image->first_row);
+  orrery_put_u16(message + 10, image->rows);
+  orrery_put_u32(message + 12, image->bits & 0xFFu);
+  orrery_put_i64(message + 16, image->exposure_begin_ns);
+  orrery_put_f64(message + 24, image->exposure_s);
+  orrery_put_f64(message + 32, image->row_period_s);
+  orrery_put_f64(message + 40, image->gain);
+  orrery_put_f64(message + 48, image->offset);
+  orrery_put_f64s(message + 56, image->fx_fy_cx_cy, 4);
+  orrery_put_f64s(message + 88, image->k1_k2_p1_p2_k3, 5);
+}
+
+/* Returns 1, or 0 where `length` is not that of such a message; then nothing is written. Pixel (u,
+ * v), v in first_row ... first_row + rows - 1, is orrery_get_u16(message +
+ * ORRERY_IMAGE_HEADER_BYTES + 2 * ((v - first_row) * width + u)). */
+ORRERY_MAYBE_UNUSED static int orrery_get_image_header(const unsigned char* message,
+                                                       uint32_t length,
+                                                       struct orrery_image* image) {
+  if (length < ORRERY_IMAGE_HEADER_BYTES ||
+      length != ORRERY_IMAGE_HEADER_BYTES +
+                    (uint32_t)2 * orrery_get_u16(message + 4) * orrery_get_u16(message + 10)) {
+    return 0;
+  }
+  image->frame = orrery_get_u32(message);
+  image->width = orrery_get_u16(message + 4);
+  image->height = orrery_get_u16(message + 6);
+  image->first_row = orrery_get_u16(message + 8);
+  image->rows = orrery_get_u16(message + 10);
+  image->bits = message[12];
+  image->exposure_begin_ns = orrery_get_i64(message + 16);
+  image->exposure_s = orrery_get_f64(message + 24);
+  image->row_period_s = orrery_get_f64(message + 32);
+  image->gain = orrery_get_f64(message + 40);
+  image->offset = orrery_get_f64(message + 48);
+  orrery_get_f64s(message + 56, image->fx_fy_cx_cy, 4);
+  orrery_get_f64s(message + 88, image->k1_k2_p1_p2_k3, 5);
+  return 1;
+}
+
+ORRERY_MAYBE_UNUSED static void orrery_put_expose(unsigned char* message, int64_t begin_ns,
+                                                  double exposure_s) {
+  orrery_put_i64(message, begin_ns);
+  orrery_put_f64(message + 8, exposure_s);
+}
+
+ORRERY_MAYBE_UNUSED static void orrery_get_expose(const unsigned char* message, int64_t* begin_ns,
+                                                  double* exposure_s) {
+  *begin_ns = orrery_get_i64(message);
+  *exposure_s = orrery_get_f64(message + 8);
 }
 
 #endif
