@@ -1,4 +1,5 @@
 #include <orrery/models/camera/detector.hpp>
+#include <orrery/models/camera/scene.hpp>
 #include <orrery/models/camera/star_field.hpp>
 
 #include <benchmark/benchmark.h>
@@ -46,6 +47,31 @@ void BM_StarField(benchmark::State& state) {
   state.counters["stars"] = double(stars) / double(state.iterations());
 }
 BENCHMARK(BM_StarField)->Arg(512)->Arg(1024)->Unit(benchmark::kMillisecond);
+
+// 1024 x 1024: stars, the Earth over half the image, and a target of 9800 triangles `range(0)` px
+// across. Items are frames of floats, on `range(1)` threads.
+void BM_Scene(benchmark::State& state) {
+  const PinholeCamera camera(star_tracker(1024));
+  Scene scene(camera, {}, {.stars = made_up_stars(), .targets = {Mesh::sphere(0.5, 50)}});
+  SceneState now;
+  now.r_sun_ECI = {1.1e11, 1e11, 2e10};
+  now.r_moon_ECI = {-3.8e8, 0, 0};
+  const Vec3 z{-0.39, 0, 0.92};  // to the limb at 550 km
+  const Vec3 x = unit(cross(Vec3{0, 1, 0}, z));
+  now.camera = {.t = gps_midnight(2025, 3, 20), .r_ECI = {6928e3, 0, 0}, .v_ECI = {0, 7585, 0}};
+  now.camera.R_CI = {x, cross(unit(z), x), unit(z)};
+  const double d = camera.fx_px() / double(state.range(0));
+  now.targets = {{.r_ECI = now.camera.r_ECI + d * unit(z), .v_ECI = now.camera.v_ECI}};
+  const int threads = static_cast<int>(state.range(1));
+  for (auto _ : state) benchmark::DoNotOptimize(scene.render(now, {}, threads).light.values.data());
+  state.SetItemsProcessed(state.iterations());
+}
+BENCHMARK(BM_Scene)
+    ->Args({100, 1})
+    ->Args({100, 2})
+    ->Args({300, 2})
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
 
 void BM_DetectorRead(benchmark::State& state) {
   const int size = static_cast<int>(state.range(0));

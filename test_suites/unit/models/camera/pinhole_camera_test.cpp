@@ -44,7 +44,8 @@ TEST(PinholeCameraTest, ProjectionIsOpenCvs) {
   if (expected.empty()) GTEST_SKIP() << "built without OpenCV (libopencv-calib3d-dev)";
   for (std::size_t k = 0; k < points.size(); ++k) {
     const Pixel seen = camera.project(points[k]).value();
-    // Both are double arithmetic of one formula, values to 640: 1e-13 relative. Observed: 1.2e-13 px.
+    // Both are double arithmetic of one formula, values to 640: 1e-13 relative. Observed: 1.2e-13
+    // px.
     EXPECT_NEAR(seen.u, expected[k].u, 1e-11);
     EXPECT_NEAR(seen.v, expected[k].v, 1e-11);
   }

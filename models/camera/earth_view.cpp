@@ -1,0 +1,163 @@
+#include <orrery/harness/kernel/text.hpp>
+#include <orrery/models/camera/earth_view.hpp>
+#include <orrery/models/camera/parallel_rows.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace orrery {
+
+namespace {
+
+constexpr double kSpeedOfLight_mps = 299792458.0;
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kAtmosphereScales = 10;
+constexpr double kWater = 0.08;
+constexpr double kGlintReflectance = 0.02, kGlintExponent = 30;
+
+void check(const char* option, double value, double low, double high) {
+  if (!(value >= low && value <= high)) {
+    throw std::invalid_argument("EarthView: " + std::string(option) + " = " + to_text(value) +
+                                "; accepted: " + to_text(low) + " to " + to_text(high));
+  }
+}
+
+// Abramowitz & Stegun 4.4.49: within 1e-5, far below a cell of the map; one code, equal bits.
+float arc_tangent(float y, float x) {
+  const float ay = std::abs(y), ax = std::abs(x);
+  const float t = std::min(ax, ay) / std::max({ax, ay, 1e-30f}), s = t * t;
+  float a =
+      t * (0.9998660f + s * (-0.3302995f + s * (0.1801410f + s * (-0.0851330f + s * 0.0208351f))));
+  if (ay > ax) a = 1.57079633f - a;
+  if (x < 0) a = 3.14159265f - a;
+  return y < 0 ? -a : a;
+}
+
+// Everything in Earth-fixed axes, z stretched so that the ellipsoid is a sphere of radius 1.
+class EarthRays {
+ public:
+  EarthRays(const EarthViewOptions& options, const EarthPose& pose)
+      : options_(options),
+        unit_m_(options.radius_m),
+        stretch_(1 / (1 - options.flattening)),
+        R_EC_(pose.R_EI * transpose(pose.R_CI)),
+        beta_C_(pose.R_CI * pose.v_ECI / kSpeedOfLight_mps),
+        to_sun_(pose.R_EI * pose.to_sun_ECI),
+        sun_(pose.sun) {
+    const Vec3 r = pose.R_EI * pose.r_ECI / unit_m_;
+    p_ = {r.x, r.y, r.z * stretch_};
+    c_ = dot(p_, p_) - 1;
+  }
+
+  struct Crossing {
+    Vec3 d_E;             // unit vector, true direction of the ray
+    Vec3 q;               // the same, stretched
+    double a = 0, b = 0;  // of a t^2 + 2 b t + c = 0
+    double height = 0;    // of the tangent point over the surface, over the radius: about
+  };
+  // From the direction in which it is seen: not aberrated, to first order (1e-9).
+  Crossing cross(const Vec3& seen_C) const {
+    Crossing x;
+    const Vec3 u = unit(seen_C);
+    x.d_E = R_EC_ * (u - beta_C_ + dot(u, beta_C_) * u);
+    x.q = {x.d_E.x, x.d_E.y, x.d_E.z * stretch_};
+    x.a = dot(x.q, x.q), x.b = dot(x.q, p_);
+    x.height = 0.5 * (c_ - x.b * x.b / x.a);
+    return x;
+  }
+  bool hits(const Crossing& x) const { return x.b < 0 && x.height <= 0; }
+
+  // Part of a pixel, and radiance [suns/sr] of the covered and of the open part.
+  struct Seen {
+    double covered = 0, radiance = 0;
+  };
+  Seen look(const Crossing& x, double pixel_rad) const {
+    Seen seen;
+    if (x.b >= 0) return seen;
+    const double range = -x.b / x.a;  // to the tangent point
+    const double off_limb_px = x.height / (range * pixel_rad);
+    seen.covered = std::clamp(0.5 - off_limb_px, 0.0, 1.0);
+    if (seen.covered > 0) seen.radiance = seen.covered * surface(x);
+    if (seen.covered < 1 && options_.atmosphere) {
+      seen.radiance += (1 - seen.covered) * limb(x, range);
+    }
+    return seen;
+  }
+
+ private:
+  double surface(const Crossing& x) const {
+    const double root = std::sqrt(std::max(0.0, x.b * x.b - x.a * c_));
+    const double t = (-x.b - root) / x.a;
+    const Vec3 s = p_ + t * x.q;  // on the unit sphere
+    const Vec3 normal = unit({s.x, s.y, s.z * stretch_});
+    const float across = static_cast<float>(std::sqrt(normal.x * normal.x + normal.y * normal.y));
+    const EarthSurface::Sample map =
+        options_.surface.at(arc_tangent(static_cast<float>(normal.y), static_cast<float>(normal.x)),
+                            arc_tangent(static_cast<float>(normal.z), across));
+    const double cosine = dot(normal, to_sun_);
+    if (cosine <= 0) return sun_ / kPi * double(map.night);
+    double radiance = sun_ / kPi * double(map.albedo) * cosine;
+    if (options_.glint && map.albedo < kWater) radiance += glint(x, normal, cosine);
+    return radiance;
+  }
+  double glint(const Crossing& x, const Vec3& normal, double cosine) const {
+    const double half = std::max(0.0, dot(normal, unit(to_sun_ - x.d_E)));
+    return sun_ * cosine * kGlintReflectance * (kGlintExponent + 8) / (8 * kPi) *
+           std::pow(half, kGlintExponent);
+  }
+  double limb(const Crossing& x, double range) const {
+    const double height_m = std::max(0.0, x.height) * unit_m_;
+    if (height_m > kAtmosphereScales * options_.scale_height_m) return 0;
+    const Vec3 s = p_ + range * x.q;
+    const double cosine = dot(unit({s.x, s.y, s.z * stretch_}), to_sun_);
+    return sun_ / kPi * options_.limb_reflectance * std::max(0.0, cosine) *
+           std::exp(-height_m / options_.scale_height_m);
+  }
+
+  const EarthViewOptions& options_;
+  double unit_m_, stretch_;
+  Mat3 R_EC_;
+  Vec3 beta_C_, to_sun_, p_;
+  double sun_, c_ = 0;
+};
+
+}  // namespace
+
+EarthView::EarthView(const EarthViewOptions& options) : options_(options) {
+  check("radius_m", options.radius_m, 1e3, 1e8);
+  check("flattening", options.flattening, 0, 0.01);
+  check("scale_height_m", options.scale_height_m, 1000, 30000);
+  check("limb_reflectance", options.limb_reflectance, 0, 1);
+}
+
+bool EarthView::is_in_view(const PinholeCamera& camera, const EarthPose& pose) const {
+  const double r = norm(pose.r_ECI);
+  const double top = options_.radius_m + kAtmosphereScales * options_.scale_height_m;
+  const double reach = std::asin(std::min(1.0, top / r)) + camera.half_field_rad() + 1e-3;
+  const double cosine = -dot(pose.R_CI.row_z, pose.r_ECI) / r;
+  return reach >= kPi || cosine > std::cos(reach);
+}
+
+bool EarthView::hides(const Vec3& u_ECI, const EarthPose& pose) const {
+  const EarthRays rays(options_, pose);
+  return rays.hits(rays.cross(pose.R_CI * u_ECI));
+}
+
+void EarthView::add(Image<float>& suns, Image<float>& covered, const Image<PixelRay>& rays,
+                    const EarthPose& pose, float weight, int threads) const {
+  const EarthRays earth(options_, pose);
+  for_bands_of_rows(threads, rays.height_px, [&](int first, int end) {
+    for (std::size_t k = rays.index(0, first); k < rays.index(0, end); ++k) {
+      const PixelRay& ray = rays.values[k];
+      const double solid_angle = ray.solid_angle_sr;
+      const EarthRays::Seen seen =
+          earth.look(earth.cross({ray.x, ray.y, 1}), std::sqrt(solid_angle));
+      suns.values[k] += weight * static_cast<float>(seen.radiance * solid_angle);
+      covered.values[k] += weight * static_cast<float>(seen.covered);
+    }
+  });
+}
+
+}  // namespace orrery
