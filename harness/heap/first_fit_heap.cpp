@@ -39,54 +39,58 @@ bool lists(const RecencyList& list, RecencyList::Slot slot, std::byte* payload, 
 
 }  // namespace
 
-// From the front of the list, where most searches end: a leaf, so that no register is saved.
+// The first block of the list is where most searches end, the second where most others do. These
+// are leaves of few variables, so that no register is saved.
 void* FirstFitHeap::allocate(std::size_t bytes) noexcept {
   const std::uint32_t size = small_block_size(bytes);
-  const RecencyList::Slot slot = list_.end() - 1;
-  const std::uint64_t entry = list_[slot];
-  if (entry < RecencyList::entry(0, size) || bytes > kMaxLimit_bytes) return allocate_behind(bytes);
-  const Offset block = static_cast<Offset>(entry);
-  const std::uint32_t found = static_cast<std::uint32_t>(entry >> 32);
-  std::byte* const payload = area_.at(block);
-  if (!agrees(payload, slot, found)) return TaggedHeap::allocate(bytes);
-  ++search_steps_;
-  ++allocations_;
-  const std::uint32_t rest = found - size;
-  if (rest < least_) {
-    list_.remove(slot);
-    tag(payload, found, kLive);
-    add_live(found);
-  } else {
-    std::byte* const after = payload + size;
-    link(after) = list_.shrink(slot, block + size, rest);
-    tag(after, rest, 0);
-    tag(payload, size, kLive);
-    add_live(size);
+  const Slot front = list_.end() - 1;
+  if (!leaves_rest(front, size) || bytes > kMaxLimit_bytes) return allocate_second(bytes);
+  std::byte* const payload = area_.at(list_.block_of(front));
+  if (!agrees(payload, front, list_.size_of(front))) return TaggedHeap::allocate(bytes);
+  return split(payload, front, size, 1);
+}
+
+[[gnu::noinline]] void* FirstFitHeap::allocate_second(std::size_t bytes) noexcept {
+  const std::uint32_t size = small_block_size(bytes);
+  const Slot front = list_.end() - 1, second = front - 1;
+  if (!leaves_rest(second, size) || list_.size_of(front) >= size || list_.full() ||
+      bytes > kMaxLimit_bytes) {
+    return allocate_behind(bytes);
   }
-  return payload;
+  std::byte* const payload = area_.at(list_.block_of(second));
+  if (!agrees(payload, second, list_.size_of(second))) return TaggedHeap::allocate(bytes);
+  return split(payload, second, size, 2);
 }
 
 [[gnu::noinline]] void* FirstFitHeap::allocate_behind(std::size_t bytes) noexcept {
   if (bytes > kMaxLimit_bytes || list_.full()) return TaggedHeap::allocate(bytes);
   const std::uint32_t size = small_block_size(bytes);
   std::uint64_t steps = 0;
-  const RecencyList::Slot slot = list_.find_slot(size, steps);
-  const Offset block = list_.block_of(slot);
+  const Slot slot = list_.find_slot(size, steps);
+  std::byte* const payload = area_.at(list_.block_of(slot));
   const std::uint32_t found = list_.size_of(slot);
-  std::byte* const payload = area_.at(block);
-  if (slot == 0 || !agrees(payload, slot, found)) return TaggedHeap::allocate(bytes);
+  if (found == 0 || !agrees(payload, slot, found)) return TaggedHeap::allocate(bytes);
+  if (leaves_rest(slot, size)) return split(payload, slot, size, steps);
+  list_.remove(slot);
+  list_.add_length(-1);
+  tag(payload, found, kLive);
   search_steps_ += steps;
   ++allocations_;
-  list_.remove(slot);
-  const std::uint32_t rest = found - size;
-  const std::uint32_t kept = rest < least_ ? found : size;
-  if (kept == size && rest != 0) {
-    std::byte* const after = payload + size;
-    link(after) = list_.push(block + size, rest);
-    tag(after, rest, 0);
-  }
-  tag(payload, kept, kLive);
-  add_live(kept);
+  add_live(found);
+  return payload;
+}
+
+// What is left of the block goes to the front of the list.
+[[gnu::always_inline]] inline void* FirstFitHeap::split(std::byte* payload, Slot slot,
+                                                        std::uint32_t size, std::uint64_t steps) {
+  const std::uint32_t rest = list_.size_of(slot) - size;
+  std::byte* const after = payload + size;
+  link(after) = list_.push_for(slot, list_.block_of(slot) + size, rest);
+  tag(after, rest, 0);
+  tag(payload, size, kLive);
+  search_steps_ += steps;
+  ++allocations_;
+  add_live(size);
   return payload;
 }
 
@@ -106,44 +110,58 @@ void FirstFitHeap::release(void* payload) noexcept {
   if ((header(at + size) & word(at, -8) & kLive) == 0) return release_joined(at, block, size);
   tag(at, size, 0);
   link(at) = list_.push(block, size);
+  list_.add_length(1);
   live_bytes_ -= size;
   ++frees_;
 }
 
-// A neighbour of the block, or both, are free.
+// One neighbour of the block is free, or both.
 [[gnu::noinline]] void FirstFitHeap::release_joined(std::byte* at, Offset block,
                                                     std::uint32_t size) noexcept {
   std::byte* const after = at + size;
   const std::uint32_t follower = header(after), leader = word(at, -8);
-  RecencyList::Slot slot_after = 0, slot_before = 0;
+  if (((follower | leader) & kLive) == 0) return release_between(at, block, size);
+  Slot slot = 0;
+  std::uint32_t joined = size;
   if ((follower & kLive) == 0) {
-    slot_after = word(after, 0);
-    if (!lists(list_, slot_after, after, block + size, follower)) return TaggedHeap::release(at);
-  }
-  if ((leader & kLive) == 0) {
+    slot = word(after, 0);
+    if (!lists(list_, slot, after, block + size, follower)) return TaggedHeap::release(at);
+    joined += follower;
+  } else {
     if (leader > block - area_.first) return TaggedHeap::release(at);
-    slot_before = word(at - leader, 0);
-    if (!lists(list_, slot_before, at - leader, block - leader, leader)) {
-      return TaggedHeap::release(at);
-    }
-  }
-
-  live_bytes_ -= size;
-  ++frees_;
-  if (slot_after != 0) {
-    list_.remove(slot_after);
-    size += follower;
-  }
-  if (slot_before != 0) {
-    list_.remove(slot_before);
+    slot = word(at - leader, 0);
+    if (!lists(list_, slot, at - leader, block - leader, leader)) return TaggedHeap::release(at);
     // Within a joined block the old header must not pass for a live block's.
     header(at) = 0;
     at -= leader;
     block -= leader;
-    size += leader;
+    joined += leader;
   }
-  tag(at, size, 0);
-  link(at) = list_.push(block, size);
+  tag(at, joined, 0);
+  link(at) = list_.push_for(slot, block, joined);
+  live_bytes_ -= size;
+  ++frees_;
+}
+
+[[gnu::noinline]] void FirstFitHeap::release_between(std::byte* at, Offset block,
+                                                     std::uint32_t size) noexcept {
+  std::byte* const after = at + size;
+  const std::uint32_t follower = header(after), leader = word(at, -8);
+  if (leader > block - area_.first) return TaggedHeap::release(at);
+  std::byte* const before = at - leader;
+  const Slot slot_after = word(after, 0), slot_before = word(before, 0);
+  if (!lists(list_, slot_after, after, block + size, follower) ||
+      !lists(list_, slot_before, before, block - leader, leader)) {
+    return TaggedHeap::release(at);
+  }
+  header(at) = 0;
+  const std::uint32_t joined = leader + size + follower;
+  tag(before, joined, 0);
+  list_.remove(std::max(slot_after, slot_before));  // of which the other may come to be the front
+  list_.add_length(-1);
+  link(before) = list_.push_for(std::min(slot_after, slot_before), block - leader, joined);
+  live_bytes_ -= size;
+  ++frees_;
 }
 
 }  // namespace orrery::internal

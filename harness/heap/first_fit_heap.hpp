@@ -18,14 +18,21 @@ class FirstFitHeap final : public TaggedHeap<RecencyList> {
   void release(void* payload) noexcept override;
 
  private:
+  using Slot = RecencyList::Slot;
   // block_size() for requests up to kMaxLimit_bytes.
   std::uint32_t small_block_size(std::size_t bytes) const {
     const std::uint32_t mask = area_.align - 1;
     const std::uint32_t size = (static_cast<std::uint32_t>(bytes) + kTags_bytes + mask) & ~mask;
     return std::max(size, least_);
   }
+  bool leaves_rest(Slot slot, std::uint32_t size) const {
+    return list_[slot] >= RecencyList::entry(0, size + least_);
+  }
+  void* allocate_second(std::size_t bytes) noexcept;
   void* allocate_behind(std::size_t bytes) noexcept;
+  void* split(std::byte* payload, Slot slot, std::uint32_t size, std::uint64_t steps);
   void release_joined(std::byte* at, Offset block, std::uint32_t size) noexcept;
+  void release_between(std::byte* at, Offset block, std::uint32_t size) noexcept;
 };
 
 }  // namespace orrery::internal

@@ -4,8 +4,8 @@
 
 namespace orrery::internal {
 
-std::uint32_t RecencyList::last_bucket(std::uint32_t g) const {
-  return std::min(g * 64 + 63, (end_ - 1) / 64);
+std::uint32_t RecencyList::end_bucket(std::uint32_t g) const {
+  return std::min(g * 64 + 64, hot_ / 64);
 }
 
 std::uint32_t RecencyList::live_in_group(std::uint32_t g) const {
@@ -15,7 +15,7 @@ std::uint32_t RecencyList::live_in_group(std::uint32_t g) const {
 }
 
 RecencyList::Slot RecencyList::search(std::uint32_t size, std::uint64_t& steps) {
-  for (std::uint32_t g = (end_ - 1) / 4096 + 1; g-- > 0;) {
+  for (std::uint32_t g = (hot_ + 4095) / 4096; g-- > 0;) {
     if (group_bounds_[g] < size) {
       steps += live_in_group(g);
       continue;
@@ -29,7 +29,7 @@ RecencyList::Slot RecencyList::search(std::uint32_t size, std::uint64_t& steps) 
 RecencyList::Slot RecencyList::find_in_group(std::uint32_t g, std::uint32_t size,
                                              std::uint64_t& steps) {
   std::uint32_t group_bound = 0;
-  for (std::uint32_t b = last_bucket(g) + 1; b-- > g * 64;) {
+  for (std::uint32_t b = end_bucket(g); b-- > g * 64;) {
     if (bounds_[b] < size) {
       steps += live_[b];
     } else if (const Slot found = find_in_bucket(b, size, steps); found != 0) {
@@ -45,7 +45,7 @@ RecencyList::Slot RecencyList::find_in_bucket(std::uint32_t b, std::uint32_t siz
                                               std::uint64_t& steps) {
   const std::uint64_t wanted = entry(0, size);
   std::uint64_t most = 0;
-  for (Slot slot = std::min(b * 64 + 64, end_), first = std::max(b * 64, kFirst); slot-- > first;) {
+  for (Slot slot = b * 64 + 64, first = std::max(b * 64, kFirst); slot-- > first;) {
     const std::uint64_t e = entries_[slot];
     steps += e != 0 ? 1 : 0;
     if (e >= wanted) return slot;
@@ -55,22 +55,20 @@ RecencyList::Slot RecencyList::find_in_bucket(std::uint32_t b, std::uint32_t siz
   return 0;
 }
 
-std::uint32_t RecencyList::bound_of_bucket(std::uint32_t b) const {
-  std::uint32_t bound = 0;
-  for (Slot slot = b * 64; slot < std::min(b * 64 + 64, end_); ++slot) {
-    bound = std::max(bound, size_of(slot));
-  }
-  return bound;
+std::uint32_t RecencyList::largest_between(Slot first, Slot end) const {
+  std::uint64_t most = 0;
+  for (Slot slot = first; slot < end; ++slot) most = std::max(most, entries_[slot]);
+  return static_cast<std::uint32_t>(most >> 32);
 }
 
 std::uint32_t RecencyList::largest() {
-  std::uint32_t best = 0;
-  for (std::uint32_t g = (end_ - 1) / 4096 + 1; g-- > 0;) {
+  std::uint32_t best = largest_between(hot_, end_);
+  for (std::uint32_t g = (hot_ + 4095) / 4096; g-- > 0;) {
     if (group_bounds_[g] <= best) continue;
     std::uint32_t group_bound = 0;
-    for (std::uint32_t b = last_bucket(g) + 1; b-- > g * 64;) {
+    for (std::uint32_t b = end_bucket(g); b-- > g * 64;) {
       if (bounds_[b] > best) {
-        bounds_[b] = bound_of_bucket(b);
+        bounds_[b] = largest_between(b * 64, b * 64 + 64);
         best = std::max(best, bounds_[b]);
       }
       group_bound = std::max(group_bound, bounds_[b]);
@@ -80,32 +78,65 @@ std::uint32_t RecencyList::largest() {
   return best;
 }
 
+// All hot slots are gone: the bucket in which the front is now is hot again.
+void RecencyList::reheat() {
+  hot_ = (end_ - 1) / 64 * 64;
+  live_[hot_ / 64] = 0;  // there is nothing in those that lay between
+  limit_ = std::min(static_cast<Slot>(entries_.size()), hot_ + kMostHot);
+}
+
+void RecencyList::index_bucket(std::uint32_t b) {
+  std::uint8_t live = 0;
+  for (Slot slot = std::max(b * 64, kFirst); slot < b * 64 + 64; ++slot) {
+    live = static_cast<std::uint8_t>(live + (entries_[slot] != 0 ? 1 : 0));
+  }
+  live_[b] = live;
+  bounds_[b] = largest_between(b * 64, b * 64 + 64);
+  if (b % 64 == 0) group_bounds_[b / 64] = 0;
+  group_bounds_[b / 64] = std::max(group_bounds_[b / 64], bounds_[b]);
+}
+
 void RecencyList::grow() {
   entries_.grow(std::max<std::size_t>(2 * entries_.size(), 1));
-  capacity_ = static_cast<Slot>(entries_.size());
-  const std::size_t groups = (capacity_ + 4095) / 4096;
+  const std::size_t groups = (entries_.size() + 4095) / 4096;
   live_.grow(groups * 64);
   bounds_.grow(groups * 64);
   group_bounds_.grow(groups);
 }
 
-// More slots if most are in use; then what is left moves together, in order.
+// Where most hot slots are empty, their blocks move together; else, where most of all are empty,
+// all blocks do. Then the hindmost hot ones are indexed, so that there is room for more.
 void RecencyList::make_room() {
-  if (length_ * 2 >= capacity_) grow();
+  const Slot capacity = static_cast<Slot>(entries_.size());
+  std::uint64_t hot_blocks = length_;
+  for (std::uint32_t b = 0; b < hot_ / 64; ++b) hot_blocks -= live_[b];
+  if (hot_blocks * 2 < end_ - hot_) {
+    move_together(hot_);
+  } else if (end_ == capacity) {
+    if (length_ * 2 < capacity) {
+      for (std::uint32_t b = 0; b < hot_ / 64; ++b) live_[b] = 0;
+      hot_ = 0;
+      move_together(0);
+    } else {
+      grow();
+    }
+  }
+  for (; end_ - hot_ > kMostHot / 2; hot_ += 64) index_bucket(hot_ / 64);
+  limit_ = std::min(static_cast<Slot>(entries_.size()), hot_ + kMostHot);
+}
+
+// Those from `first` on close up, in order.
+void RecencyList::move_together(Slot first) {
   const Slot old_end = end_;
-  for (std::uint32_t b = 0; b * 64 < old_end; ++b) {
-    live_[b] = 0;
-    bounds_[b] = group_bounds_[b / 64] = 0;
-  }
-  end_ = kFirst;
-  length_ = 0;
-  for (Slot slot = kFirst; slot < old_end; ++slot) {
+  const Slot begin = std::max(first, kFirst);
+  end_ = begin;
+  for (Slot slot = begin; slot < old_end; ++slot) {  // without a branch that nobody could foresee
     const std::uint64_t e = entries_[slot];
-    entries_[slot] = 0;
-    if (e == 0) continue;
-    const HeapOffset block = static_cast<HeapOffset>(e);
-    area_.link(block) = push(block, static_cast<std::uint32_t>(e >> 32));
+    entries_[end_] = e;
+    end_ += e != 0 ? 1 : 0;
   }
+  for (Slot slot = end_; slot < old_end; ++slot) entries_[slot] = 0;
+  for (Slot slot = begin; slot < end_; ++slot) area_.link(block_of(slot)) = mark(slot);
 }
 
 HeapOffset RecencyList::check(std::uint64_t blocks) const {
@@ -116,7 +147,7 @@ HeapOffset RecencyList::check(std::uint64_t blocks) const {
     const HeapOffset block = block_of(slot);
     const std::uint32_t size = size_of(slot);
     if (!area_.within(block) || area_.header(block) != size || !holds(block, size) ||
-        size > bounds_[slot / 64] || size > group_bounds_[slot / 4096]) {
+        (slot < hot_ && (size > bounds_[slot / 64] || size > group_bounds_[slot / 4096]))) {
       return block;
     }
   }
