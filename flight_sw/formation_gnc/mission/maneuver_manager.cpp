@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "formation_gnc/control/science_orbit.hpp"
 #include "formation_gnc/control/sun_direction.hpp"
@@ -85,14 +86,7 @@ bool ManeuverManager::next(const Situation& now, Impulse* wanted) {
       if (now.t_ns >= replan_ns_) plan_science(now);
       break;
     case Mode::kEscape:
-      if (!planned_) {
-        plan_ = SeparationMonitor().escape(
-            {now.t_ns, now.chief, now.deputy, now.relative_covariance_RTN}, soonest_ns(now));
-        next_burn_ = 0;
-        planned_ = true;
-        ++plans_;
-        if (!plan_.usable()) trouble_ = to_string(plan_.status);
-      }
+      if (!planned_) plan_escape(now);
       break;
     default:
       return false;
@@ -109,11 +103,27 @@ void ManeuverManager::plan_to(const Situation& now, const TransferGoal& goal,
   options.waypoints = options_.waypoints;
   TransferStart start;
   start.orbit = relative_orbit(now);
-  plan_ = ReconfigurationPlanner(options).plan(start, goal);
-  next_burn_ = 0;
-  planned_ = true;
+  start.a_da_rate_mps = now.a_da_rate_mps;
+  take(ReconfigurationPlanner(options).plan(start, goal));
+}
+
+void ManeuverManager::take(TransferPlan&& plan) {
   ++plans_;
-  if (!plan_.usable()) trouble_ = to_string(plan_.status);
+  if (!plan.usable()) {
+    trouble_ = to_string(plan.status);
+    return;
+  }
+  plan_ = std::move(plan);
+  next_burn_ = 0;
+}
+
+// Nearly all of its burns are as large as the thruster allows.
+void ManeuverManager::plan_escape(const Situation& now) {
+  SeparationOptions options;
+  options.limits = options_.limits;
+  take(SeparationMonitor(options).escape(
+      {now.t_ns, now.chief, now.deputy, now.relative_covariance_RTN}, soonest_ns(now)));
+  planned_ = true;
 }
 
 // The goal holds at the first observation after the arrival: what the orbit does until then is the
@@ -192,6 +202,7 @@ bool ManeuverManager::align(const Situation& now, Impulse* wanted) {
 void ManeuverManager::commanded(const Impulse& wanted, bool accepted) {
   if (from_plan_) ++next_burn_;
   if (accepted) last_burn_ns_ = wanted.t_ns;
+  if (!accepted && event_.mode == Mode::kEscape) planned_ = false;
 }
 
 }  // namespace formation_gnc

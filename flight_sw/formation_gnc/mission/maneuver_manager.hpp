@@ -3,8 +3,9 @@
 /// Transfer    to the goal by the planner, anew every few hours with what navigation has learnt.
 /// Science     between observations likewise, to the science orbit of the next observation; in the
 ///             last 40 min trims by numerical prediction (fine_alignment.hpp).
-/// Escape      the escape of separation_monitor.hpp.
+/// Escape      the escape of separation_monitor.hpp, within the thruster's limits as they are here.
 /// Standby, safe  nothing.
+/// A plan that cannot be made leaves the one before in force: that leads to the goal it had.
 /// One burn is commanded at a time, `burn_lead_s` ahead.
 #pragma once
 
@@ -39,7 +40,8 @@ struct Situation {
   std::int64_t t_ns = 0;
   flight_support::StateEci chief, deputy;
   flight_support::Matrix6 relative_covariance_RTN;
-  double sigma_r_m = 0.0;  ///< 3D
+  double sigma_r_m = 0.0;      ///< 3D
+  double a_da_rate_mps = 0.0;  ///< d(a*da)/dt by differential drag, of the deputy
 };
 
 class ManeuverManager {
@@ -54,7 +56,7 @@ class ManeuverManager {
 
   /// The burn to command now, as it is wanted. False: none now.
   bool next(const Situation& now, Impulse* wanted);
-  /// What became of it.
+  /// What became of it. An escape that the thruster refused a burn of is planned anew.
   void commanded(const Impulse& wanted, bool accepted);
 
   /// Null, or what went wrong with the last plan. Each once.
@@ -68,6 +70,8 @@ class ManeuverManager {
  private:
   void plan_transfer(const Situation& now);
   void plan_science(const Situation& now);
+  void plan_escape(const Situation& now);
+  void take(TransferPlan&& plan);
   void plan_to(const Situation& now, const TransferGoal& goal, std::int64_t last_ns);
   bool align(const Situation& now, Impulse* wanted);
   bool next_of_plan(const Situation& now, Impulse* wanted);
