@@ -14,13 +14,17 @@
  * `every`-th orbit. REMOVE  takes entry `number` out of the plan, if it is there. CLEAR   empties
  * the plan and withdraws what was announced and is not committed.
  *
- *   telemetry, 200 bytes
+ *   telemetry, 312 bytes
  *     0 u16 magic 0x5447 | 2 u8 version | 3 u8 role | 4 u32 mode | 8 i64 t_ns | 16 f64 a_roe_m[6]
  *     | 64 f64 sigma_r_m[3] | 88 f64 sigma_v_mps[3] | 112 f64 delta_v_mps | 120 i64 next_event_ns
  * (0: none) | 128 f64 minimum_separation_m | 136 u32 boot_count | 140 u32 transition | 144 u32 late
  *     | 148 u32 postponed | 152 u32 rejected | 156 u32 burns | 160 u32 observations | 164 u32
  * skipped | 168 u32 retransmissions | 172 u32 fixed_ambiguities | 176 u32 plan_entries | 180 u32
- * fault | 184 u32 measurements_sent | 188 u32 measurements_heard | 192 u32 flags | 196 u32 crc
+ * fault | 184 u32 measurements_sent | 188 u32 measurements_heard | 192 u32 flags
+ *     | 196 f64 drag_difference_mps2 | 204 graphic | 220 sdcp: innovations since boot, each u32
+ *     degrees of freedom, u32 rejected, f64 sum of squares over variances; of epochs in time
+ *     | 236 integers held, 12 times: u8 prn (0: none), 40-bit two's complement cycles, of single
+ *     differences deputy less chief, up to what all have in common | 308 u32 crc
  *     flags: 1 navigation valid, 2 integers fixed, 4 partner heard, 8 transition pending.
  *
  *   crosslink packet, both ways
@@ -43,9 +47,9 @@
 #include "orrery_crc32.h"
 #include "orrery_messages.h"
 
-#define FORMATION_GNC_VERSION 1u
+#define FORMATION_GNC_VERSION 2u
 #define FORMATION_GNC_COMMAND_BYTES 48u
-#define FORMATION_GNC_TELEMETRY_BYTES 200u
+#define FORMATION_GNC_TELEMETRY_BYTES 312u
 #define FORMATION_GNC_SATELLITES 12u
 #define FORMATION_GNC_HEADER_BYTES 24u
 #define FORMATION_GNC_MEASUREMENT_BYTES (44u + 14u * FORMATION_GNC_SATELLITES)
@@ -80,6 +84,16 @@ typedef struct formation_gnc_command {
   double a_m, b_m;
 } formation_gnc_command;
 
+typedef struct formation_gnc_innovations {
+  uint32_t degrees, rejected;
+  double chi2;
+} formation_gnc_innovations;
+
+typedef struct formation_gnc_integer {
+  unsigned prn;
+  int64_t cycles;
+} formation_gnc_integer;
+
 typedef struct formation_gnc_telemetry {
   unsigned role;
   uint32_t mode;
@@ -91,6 +105,9 @@ typedef struct formation_gnc_telemetry {
   uint32_t boot_count, transition, late, postponed, rejected, burns, observations, skipped;
   uint32_t retransmissions, fixed_ambiguities, plan_entries, fault;
   uint32_t measurements_sent, measurements_heard, flags;
+  double drag_difference_mps2; /* deputy less chief, along track */
+  formation_gnc_innovations graphic, sdcp;
+  formation_gnc_integer integer[FORMATION_GNC_SATELLITES];
 } formation_gnc_telemetry;
 
 typedef struct formation_gnc_header {
@@ -184,8 +201,23 @@ ORRERY_MAYBE_UNUSED static int formation_gnc_get_command(const unsigned char* me
   return 1;
 }
 
+ORRERY_MAYBE_UNUSED static void formation_gnc_put_innovations(unsigned char* at,
+                                                              const formation_gnc_innovations* i) {
+  orrery_put_u32(at, i->degrees);
+  orrery_put_u32(at + 4, i->rejected);
+  orrery_put_f64(at + 8, i->chi2);
+}
+
+ORRERY_MAYBE_UNUSED static void formation_gnc_get_innovations(const unsigned char* at,
+                                                              formation_gnc_innovations* i) {
+  i->degrees = orrery_get_u32(at);
+  i->rejected = orrery_get_u32(at + 4);
+  i->chi2 = orrery_get_f64(at + 8);
+}
+
 ORRERY_MAYBE_UNUSED static void formation_gnc_put_telemetry(unsigned char* message,
                                                             const formation_gnc_telemetry* t) {
+  unsigned k;
   formation_gnc_begin(message, 0x5447u, t->role);
   orrery_put_u32(message + 4, t->mode);
   orrery_put_i64(message + 8, t->t_ns);
@@ -210,12 +242,20 @@ ORRERY_MAYBE_UNUSED static void formation_gnc_put_telemetry(unsigned char* messa
   orrery_put_u32(message + 184, t->measurements_sent);
   orrery_put_u32(message + 188, t->measurements_heard);
   orrery_put_u32(message + 192, t->flags);
+  orrery_put_f64(message + 196, t->drag_difference_mps2);
+  formation_gnc_put_innovations(message + 204, &t->graphic);
+  formation_gnc_put_innovations(message + 220, &t->sdcp);
+  for (k = 0; k < FORMATION_GNC_SATELLITES; k++) {
+    message[236 + 6 * k] = (unsigned char)(t->integer[k].prn & 0xFFu);
+    formation_gnc_put_int(message + 237 + 6 * k, 5, t->integer[k].cycles);
+  }
   formation_gnc_seal(message, FORMATION_GNC_TELEMETRY_BYTES);
 }
 
 ORRERY_MAYBE_UNUSED static int formation_gnc_get_telemetry(const unsigned char* message,
                                                            uint32_t bytes,
                                                            formation_gnc_telemetry* t) {
+  unsigned k;
   if (bytes != FORMATION_GNC_TELEMETRY_BYTES) return 0;
   if (!formation_gnc_is_sound(message, bytes, 0x5447u)) return 0;
   t->role = message[3];
@@ -242,6 +282,13 @@ ORRERY_MAYBE_UNUSED static int formation_gnc_get_telemetry(const unsigned char* 
   t->measurements_sent = orrery_get_u32(message + 184);
   t->measurements_heard = orrery_get_u32(message + 188);
   t->flags = orrery_get_u32(message + 192);
+  t->drag_difference_mps2 = orrery_get_f64(message + 196);
+  formation_gnc_get_innovations(message + 204, &t->graphic);
+  formation_gnc_get_innovations(message + 220, &t->sdcp);
+  for (k = 0; k < FORMATION_GNC_SATELLITES; k++) {
+    t->integer[k].prn = message[236 + 6 * k];
+    t->integer[k].cycles = formation_gnc_get_int(message + 237 + 6 * k, 5);
+  }
   return 1;
 }
 

@@ -168,6 +168,11 @@ bool FormationGnc::in_crosslink(std::int64_t now_onboard_ns, const unsigned char
   if (verdict == CrosslinkLayer::Verdict::kMeasurement) {
     ++measurements_heard_;
     navigation_.remote_epoch(crosslink_.epoch(), crosslink_.q_BI());
+    const UpdateReports& reports = navigation_.reports();
+    if (reports.t_ns == crosslink_.epoch().t_ns) {
+      graphic_.add(reports.graphic_other);
+      sdcp_.add(reports.sdcp);
+    }
   }
   Payload payload;
   while (crosslink_.link().take(&payload)) good = take_payload(payload, now_ns) && good;
@@ -248,6 +253,7 @@ void FormationGnc::handle_epoch(const GnssEpoch& epoch, std::int64_t now_onboard
   if (attitude_.t_ns != 0) {
     const Quaternion q_BI = attitude_at(epoch.t_ns);
     navigation_.own_epoch(epoch, q_BI);
+    if (navigation_.reports().t_ns == epoch.t_ns) graphic_.add(navigation_.reports().graphic_self);
     // Slots are counted in GPS time, so that both send the same epochs.
     const std::int64_t slot = epoch.t_ns / nanoseconds(configuration_.crosslink_period_s);
     if (slot != last_crosslink_slot_) {
@@ -371,6 +377,9 @@ Situation FormationGnc::situation(const FormationEstimate& estimate) const {
   s.deputy = {e.r_other_ECI, e.v_other_ECI};
   s.relative_covariance_RTN = e.relative_covariance_RTN;
   s.sigma_r_m = std::sqrt(trace_of_position(e.relative_covariance_RTN));
+  // Gauss: d(a*da)/dt = 2 a_T / n.
+  const double n_radps = mean_motion_radps(osculating_from_state(s.chief).a_m);
+  s.a_da_rate_mps = 2.0 * e.drag_difference_mps2 / n_radps;
   return s;
 }
 
@@ -490,6 +499,21 @@ void FormationGnc::send_estimate(const FormationEstimate& estimate) {
   out_.out_estimate(output);
 }
 
+// Whole cycles of deputy less chief, up to what all have in common.
+void FormationGnc::fill_integers(formation_gnc_telemetry* t) const {
+  const FormationFilter& filter = navigation_.filter();
+  unsigned count = 0;
+  for (int channel = 0; channel < kChannels; ++channel) {
+    const CarrierArc& self = filter.arcs(Who::kSelf)[channel];
+    const int at = self.prn != 0 ? filter.arcs(Who::kOther).find(self.prn) : -1;
+    if (at < 0 || !filter.integers().holds(self.prn)) continue;
+    const double cycles = filter.arcs(Who::kOther)[at].base_cycles - self.base_cycles +
+                          filter.integers().value(self.prn);
+    t->integer[count].prn = static_cast<unsigned>(self.prn);
+    t->integer[count++].cycles = std::llround(is_deputy() ? -cycles : cycles);
+  }
+}
+
 void FormationGnc::send_telemetry(std::int64_t now_ns, const FormationEstimate& estimate) {
   const TransitionProtocol& protocol = mission_.protocol();
   formation_gnc_telemetry t = {};
@@ -522,6 +546,10 @@ void FormationGnc::send_telemetry(std::int64_t now_ns, const FormationEstimate& 
   t.fault = is_emergency(mode()) ? protocol.record().fault : 0u;
   t.measurements_sent = measurements_sent_;
   t.measurements_heard = measurements_heard_;
+  t.drag_difference_mps2 = from_chief(estimate).drag_difference_mps2;
+  t.graphic = graphic_.telemetry();
+  t.sdcp = sdcp_.telemetry();
+  fill_integers(&t);
   t.flags = (estimate.valid ? 1u : 0u) | (estimate.fixed ? 2u : 0u) |
             (partner_heard_ns_ != 0 ? 4u : 0u) | (protocol.has_pending() ? 8u : 0u);
   unsigned char message[FORMATION_GNC_TELEMETRY_BYTES];

@@ -16,6 +16,7 @@
 
 #include <cstdint>
 
+#include "formation_gnc/formation_gnc_messages.h"
 #include "formation_gnc/mission/configuration.hpp"
 #include "formation_gnc/mission/crosslink_layer.hpp"
 #include "formation_gnc/mission/onboard_clock.hpp"
@@ -83,6 +84,18 @@ class FormationGnc {
     Quaternion q_BI;
     double omega_B[3] = {};
   };
+  /// Innovations since boot, of epochs processed in time; replays do not count again.
+  struct Innovations {
+    std::uint32_t degrees = 0, rejected = 0;
+    double chi2 = 0.0;
+
+    void add(const UpdateReport& report) {
+      degrees += static_cast<std::uint32_t>(report.degrees);
+      rejected += static_cast<std::uint32_t>(report.rejected);
+      chi2 += report.chi2;
+    }
+    formation_gnc_innovations telemetry() const { return {degrees, rejected, chi2}; }
+  };
   /// What was commanded and is waited for, to learn the thruster's scale from.
   struct Watched {
     bool waiting = false;
@@ -120,6 +133,7 @@ class FormationGnc {
   FormationEstimate from_chief(const FormationEstimate& estimate) const;
   void send_estimate(const FormationEstimate& estimate);
   void send_telemetry(std::int64_t now_ns, const FormationEstimate& estimate);
+  void fill_integers(formation_gnc_telemetry* t) const;
   void say(LogLevel level, const char* format, ...);
 
   Outputs& out_;
@@ -136,6 +150,7 @@ class FormationGnc {
   ThrusterScale scale_;
   Attitude attitude_;
   Watched watched_;
+  Innovations graphic_, sdcp_;
   SeparationForecast forecast_;
 
   std::int64_t last_epoch_ns_ = 0;

@@ -18,6 +18,11 @@ int CarrierArcs::find(int prn) const {
   return -1;
 }
 
+bool CarrierArcs::seen(int prn, std::int64_t t_ns) const {
+  const int channel = find(prn);
+  return channel >= 0 && arc_[channel].last_ns == t_ns;
+}
+
 bool CarrierArcs::continues(int channel, const Observation& o, std::int64_t t_ns) const {
   const CarrierArc& arc = arc_[channel];
   if (arc.prn != o.prn || arc.half_cycle != o.half_cycle) return false;

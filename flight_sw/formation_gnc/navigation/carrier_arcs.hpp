@@ -25,6 +25,8 @@ class CarrierArcs {
  public:
   /// Channel of a satellite, or -1.
   int find(int prn) const;
+  /// True: the satellite has a channel, and its latest epoch is this one.
+  bool seen(int prn, std::int64_t t_ns) const;
   const CarrierArc& operator[](int channel) const { return arc_[channel]; }
   CarrierArc& operator[](int channel) { return arc_[channel]; }
 

@@ -68,6 +68,7 @@ void fill_orbits(const OrbitPair& orbits, FormationEstimate* e) {
   e->v_self_ECI = orbits.v[0];
   e->r_other_ECI = orbits.r[1];
   e->v_other_ECI = orbits.v[1];
+  e->drag_difference_mps2 = orbits.empirical_RTN[1][1] - orbits.empirical_RTN[0][1];
   fill_relative(e);
 }
 
@@ -104,6 +105,8 @@ FormationEstimate Navigation::at(std::int64_t t_ns) const {
     e = told_by(moved);
     fill_orbits(moved.orbits(), &e);
     e.covariance = told_covariance(moved.covariance());
+    e.sigma_drag_difference_mps2 =
+        std::sqrt(moved.covariance().variance(kAccelerationDifference + 1));
     fill_relative_covariance(&e);
   }
   e.t_ns = t_ns;
@@ -128,6 +131,7 @@ FormationEstimate seen_from_other(const FormationEstimate& estimate) {
   e.v_other_ECI = estimate.v_self_ECI;
   e.last_own_ns = estimate.last_remote_ns;
   e.last_remote_ns = estimate.last_own_ns;
+  e.drag_difference_mps2 = -estimate.drag_difference_mps2;
   fill_relative(&e);
   // (other, -difference) from (self, difference).
   Matrix<12, 12> M;

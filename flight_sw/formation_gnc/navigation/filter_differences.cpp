@@ -50,8 +50,9 @@ UpdateReport FormationFilter::sdcp_update(const GnssEpoch& self, const Quaternio
   look(kOther, other, q_other, satellites, &b);
   Differences all;
   for (int k = 0; k < a.count; ++k) {
-    const int j = b.find(a.observation[k]->prn);
-    if (j < 0) continue;
+    const int prn = a.observation[k]->prn, j = b.find(prn);
+    // An ephemeris that came between both epochs' updates shows a satellite that has no arc yet.
+    if (j < 0 || !arcs_[kSelf].seen(prn, t_ns_) || !arcs_[kOther].seen(prn, t_ns_)) continue;
     all.item[all.count++] =
         difference(*a.observation[k], a.predicted[k], *b.observation[j], b.predicted[j]);
   }

@@ -91,6 +91,7 @@ bool FormationFilter::take(const SparseRow& h, double r, double innovation, Upda
   ud_.measure(projection, r, gain);
   for (int k = 0; k < kStates; ++k) correction_[k] += nu * gain[k];
   ++report->used;
+  ++report->degrees;
   report->chi2 += nu * nu / s;
   return true;
 }
@@ -142,8 +143,10 @@ UpdateReport FormationFilter::graphic_update(Who which, const GnssEpoch& epoch,
     const double predicted_m = p.range_m + 0.5 * kWavelength_m * arc.ambiguity_cycles;
     const double r =
         square(0.5 * code_sigma_m(static_cast<double>(o.cn0_dBHz))) + square(options_.code_floor_m);
-    take(h, r, measured_m - predicted_m, &report);
+    const bool used = take(h, r, measured_m - predicted_m, &report);
+    if (used && arc.begin_ns == t_ns_) --report.degrees;
   }
+  report.degrees = report.degrees > 1 ? report.degrees - 1 : 0;
   settle();
   judge_graphic(who, report);
   return report;

@@ -34,20 +34,24 @@ namespace formation_gnc {
 struct FilterOptions {
   OrbitPairOptions orbit = {};
 
-  /// Empirical acceleration of self, 1 sigma [m/s^2]; 2e-5 covers what a field of 20x20 omits at
-  /// 550 km.
-  double empirical_sigma_mps2 = 2e-5;
+  /// Empirical acceleration of self, 1 sigma [m/s^2]. What a field of 20x20 omits at 550 km is 7e-6
+  /// along R and 5e-6 along T and N (root mean square over a day), three times that above mountains
+  /// and trenches.
+  double empirical_sigma_mps2 = 1e-5;
   double empirical_tau_s = 200.0;  ///< at least four steps
-  /// Of the difference: differential drag and radiation, and per metre of separation the omitted
-  /// gravity gradient [1/s^2].
-  double relative_sigma_mps2 = 1e-9;
-  double relative_sigma_per_m = 5e-11;
+  /// Of the difference. Drag, along track: 2.5 % of 1.2e-7 m/s^2 (550 km, 150 sfu, 0.012 m^2/kg),
+  /// over an orbit. Radiation pressure, each axis: 1 % of 4.5e-8 m/s^2. Gravity that the field
+  /// omits: kOmittedGradient, times the separation and this factor.
+  double drag_difference_mps2 = 3e-9;
+  double drag_tau_s = 5700.0;
+  double radiation_difference_mps2 = 4.5e-10;
+  double omitted_gradient_factor = 1.0;
 
   Vec3 lever_arm_B = flight_support::vec3(0.05, 0.0, 0.10);  ///< antenna from centre of mass [m]
   /// Errors of GPS orbits along the line of sight change as the geometry turns: a random walk of
   /// the ambiguities of both receivers together [m/sqrt(s)].
   double broadcast_walk_mps05 = 0.008;
-  double code_floor_m = 0.02;   ///< added to the thermal noise of GRAPHIC
+  double code_floor_m = 0.003;  ///< added to the thermal noise of GRAPHIC: codes come in cm
   double phase_floor_m = 1e-4;  ///< added to the thermal noise of each phase: multipath, attitude
   /// Vertical delay above the orbit [m of L1]: 0.8 for 5 TECU, and half as much again since errors
   /// of it last. What two spacecraft do not share is noise of their single difference: 10 mm at the
@@ -65,10 +69,12 @@ struct FilterOptions {
   IntegerOptions integers = {};
 };
 
-/// What one update did, for monitoring. Over scalars that were used, chi2 is the sum of nu^2 / S,
-/// of as many degrees of freedom, less one for GRAPHIC: its clock was started from the same codes.
+/// What one update did, for monitoring. Over scalars that were used, chi2 is the sum of nu^2 / S.
+/// It has as many degrees of freedom, but for GRAPHIC one less for the clock, which was started
+/// from the same codes, and one less for each ambiguity that was.
 struct UpdateReport {
   int used = 0, rejected = 0;
+  int degrees = 0;
   double chi2 = 0.0;
 };
 
@@ -123,12 +129,14 @@ class FormationFilter {
   struct Difference;
   struct Differences;
 
-  double relative_sigma_mps2() const;
+  EmpiricalAcceleration empirical_self() const;
+  EmpiricalAcceleration empirical_difference() const;
   void forget_clocks();
   enum class What { kAll, kOrbitsOnly };
   void move_to(std::int64_t t_ns, const ManeuverList& maneuvers, What what);
   void step_to(std::int64_t t_ns, What what);
   void step(std::int64_t t_ns, What what);
+  void push(const OrbitTransition& self, const OrbitTransition& difference);
   void apply_maneuver(const Maneuver& maneuver, double share);
   void walk_ambiguities();
 

@@ -46,6 +46,8 @@ struct FormationEstimate {
   Vec3 r_other_ECI, v_other_ECI;
   Vec3 r_relative_ECI, v_relative_ECI;  ///< other less self
   Vec3 r_relative_RTN, v_relative_RTN;  ///< of self; derivative taken in RTN
+  /// Of other less self along track, what lasts for an orbit: differential drag [m/s^2].
+  double drag_difference_mps2 = 0.0, sigma_drag_difference_mps2 = 0.0;
   /// Of (r_self, v_self, r_relative, v_relative), ECI.
   flight_support::Matrix<12, 12> covariance;
   flight_support::Matrix<6, 6> relative_covariance_RTN;  ///< of (r, v) relative, in RTN

@@ -59,16 +59,17 @@ Factor3 factor(double rr, double rv, double ra, double vv, double va, double aa)
 
 // Covariance of (r, v, a) that white noise of density q builds up in a = -a/tau + w over dt, by
 // series in x = dt/tau where the closed form would cancel: three terms of each, good to 1e-3 at
-// x = 0.3.
-Factor3 integrated_noise(double dt_s, double sigma_mps2, double tau_s) {
+// x = 0.3. White acceleration of its own density is added.
+Factor3 integrated_noise(double dt_s, double sigma_mps2, double tau_s, double white) {
   const double q = 2.0 * sigma_mps2 * sigma_mps2 / tau_s;
   const double t = dt_s, x = dt_s / tau_s;
   const double aa = -sigma_mps2 * sigma_mps2 * std::expm1(-2.0 * x);
   const double va = q * t * t * (1.0 / 2 - x * (1.0 / 2 - x * (7.0 / 24)));
   const double ra = q * t * t * t * (1.0 / 6 - x * (1.0 / 6 - x * (11.0 / 120)));
-  const double vv = q * t * t * t * (1.0 / 3 - x * (1.0 / 4 - x * (7.0 / 60)));
-  const double rv = q * t * t * t * t * (1.0 / 8 - x * (1.0 / 12 - x * (5.0 / 144)));
-  const double rr = q * t * t * t * t * t * (1.0 / 20 - x * (1.0 / 36 - x * (5.0 / 504)));
+  const double vv = white * t + q * t * t * t * (1.0 / 3 - x * (1.0 / 4 - x * (7.0 / 60)));
+  const double rv = t * t * (white / 2 + q * t * t * (1.0 / 8 - x * (1.0 / 12 - x * (5.0 / 144))));
+  const double rr =
+      t * t * t * (white / 3 + q * t * t * (1.0 / 20 - x * (1.0 / 36 - x * (5.0 / 504))));
   return factor(rr, rv, ra, vv, va, aa);
 }
 
@@ -153,26 +154,37 @@ Mat3 gravity_gradient(const Vec3& r) {
 }
 
 OrbitTransition orbit_transition(const Vec3& r_middle, const Vec3& v_middle, double dt_s,
-                                 double tau_s) {
+                                 const Vec3& tau_s) {
   const Mat3 G = gravity_gradient(r_middle), GG = G * G, one = flight_support::identity<3>();
-  const Mat3 R_IH = rtn_to_eci(r_middle, v_middle);
-  const double dt2 = dt_s * dt_s, x = dt_s / tau_s, m1 = -std::expm1(-x);
+  const double dt2 = dt_s * dt_s;
   OrbitTransition t;
   t.rr = one + (dt2 / 2) * G + (dt2 * dt2 / 24) * GG;
   t.rv = dt_s * (one + (dt2 / 6) * G + (dt2 * dt2 / 120) * GG);
   t.vr = dt_s * (G + (dt2 / 6) * GG);
   t.vv = t.rr;
-  t.va = (tau_s * m1) * R_IH;
-  t.ra = (tau_s * tau_s * (x - m1)) * R_IH;
-  t.aa = 1.0 - m1;
+  return with_time_constants(t, rtn_to_eci(r_middle, v_middle), dt_s, tau_s);
+}
+
+OrbitTransition with_time_constants(const OrbitTransition& transition, const Mat3& R_IH,
+                                    double dt_s, const Vec3& tau_s) {
+  OrbitTransition t = transition;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double tau = tau_s[axis], x = dt_s / tau, m1 = -std::expm1(-x);
+    t.aa[axis] = 1.0 - m1;
+    for (int k = 0; k < 3; ++k) {
+      t.va(k, axis) = tau * m1 * R_IH(k, axis);
+      t.ra(k, axis) = tau * tau * (x - m1) * R_IH(k, axis);
+    }
+  }
   return t;
 }
 
-OrbitNoise orbit_noise(const Mat3& R_IH, double dt_s, double sigma_mps2, double tau_s) {
-  const Factor3 f = integrated_noise(std::fabs(dt_s), sigma_mps2, tau_s);
+OrbitNoise orbit_noise(const Mat3& R_IH, double dt_s, const EmpiricalAcceleration& empirical) {
   const double sign = dt_s < 0.0 ? -1.0 : 1.0;
   OrbitNoise noise = {};
   for (int axis = 0; axis < 3; ++axis) {
+    const Factor3 f = integrated_noise(std::fabs(dt_s), empirical.sigma_mps2[axis],
+                                       empirical.tau_s[axis], empirical.white_m2ps3[axis]);
     double(&r)[9] = noise.column[axis], (&v)[9] = noise.column[3 + axis],
     (&a)[9] = noise.column[6 + axis];
     for (int k = 0; k < 3; ++k) {

@@ -60,11 +60,22 @@ void coast(OrbitPair* pair, std::int64_t t_ns, double dt_s, const OrbitPairOptio
 /// Gradient of gravity, central term and J2 about the z axis of ECI [1/s^2].
 Mat3 gravity_gradient(const Vec3& r);
 
+/// Empirical acceleration of one orbit: first-order Gauss-Markov by axis of RTN. Where it is a slow
+/// one, what changes faster is white noise beside it.
+struct EmpiricalAcceleration {
+  Vec3 sigma_mps2;   ///< steady state
+  Vec3 tau_s;        ///< at least three steps each
+  Vec3 white_m2ps3;  ///< spectral density
+};
+
 /// From the state at the middle of a step.
 OrbitTransition orbit_transition(const Vec3& r_middle, const Vec3& v_middle, double dt_s,
-                                 double tau_s);
+                                 const Vec3& tau_s);
+/// The same for empirical accelerations of other time constants.
+OrbitTransition with_time_constants(const OrbitTransition& transition, const Mat3& R_IH,
+                                    double dt_s, const Vec3& tau_s);
 
-/// Integrated Gauss-Markov noise of steady-state sigma and time constant over |dt_s|.
-OrbitNoise orbit_noise(const Mat3& R_IH, double dt_s, double sigma_mps2, double tau_s);
+/// What empirical accelerations build up over |dt_s|.
+OrbitNoise orbit_noise(const Mat3& R_IH, double dt_s, const EmpiricalAcceleration& empirical);
 
 }  // namespace formation_gnc

@@ -22,7 +22,7 @@ void apply(const OrbitTransition& t, const double x[kHalf], double y[kHalf]) {
   apply(t.vr, x, y + 3);
   apply(t.vv, x + 3, y + 3);
   apply(t.va, x + 6, y + 3);
-  for (int k = 6; k < 9; ++k) y[k] = t.aa * x[k];
+  for (int k = 6; k < 9; ++k) y[k] = t.aa[k - 6] * x[k];
 }
 
 }  // namespace
@@ -157,39 +157,40 @@ struct UdFactor::Weighted {
   void set(int r, int c, double value) { row[r][c / 2][c % 2] = value; }
 };
 
-void UdFactor::move_rows(const OrbitTransition& transition, int column) {
+void UdFactor::move_rows(int first, const OrbitTransition& transition, int column) {
   double x[kHalf], y[kHalf];
-  for (int first = kSelf; first <= kDifference; first += kHalf) {
-    for (int k = 0; k < kHalf; ++k) x[k] = u(first + k, column);
-    apply(transition, x, y);
-    for (int k = 0; k < kHalf; ++k) set(first + k, column, y[k]);
-  }
+  for (int k = 0; k < kHalf; ++k) x[k] = u(first + k, column);
+  apply(transition, x, y);
+  for (int k = 0; k < kHalf; ++k) set(first + k, column, y[k]);
 }
 
-void UdFactor::move_orbits(const OrbitTransition& transition, const OrbitNoise& self,
-                           const OrbitNoise& difference) {
+void UdFactor::move_orbits(const OrbitTransition& self, const OrbitTransition& difference,
+                           const OrbitNoise& self_noise, const OrbitNoise& difference_noise) {
   Weighted w;
   for (int c = 0; c < kOrbitStates; ++c) {
     const int column = kSelf + c;
     const int place = c < kHalf ? kOrbitStates + c : c - kHalf;
     double x[kOrbitStates] = {}, y[kOrbitStates];
     for (int k = 0; k <= c; ++k) x[k] = u(kSelf + k, column);
-    apply(transition, x, y);
-    apply(transition, x + kHalf, y + kHalf);
+    apply(self, x, y);
+    apply(difference, x + kHalf, y + kHalf);
     for (int k = 0; k < kOrbitStates; ++k) w.set(k, place, y[k]);
     w.weight[place / 2][place % 2] = d_[column];
   }
   for (int c = 0; c < kHalf; ++c) {
     const int lower = kHalf + c, upper = kOrbitStates + kHalf + c;
     for (int k = 0; k < kHalf; ++k) {
-      w.set(kHalf + k, lower, difference.column[c][k]);
-      w.set(k, upper, self.column[c][k]);
+      w.set(kHalf + k, lower, difference_noise.column[c][k]);
+      w.set(k, upper, self_noise.column[c][k]);
     }
-    w.weight[lower / 2][lower % 2] = difference.weight[c];
-    w.weight[upper / 2][upper % 2] = self.weight[c];
+    w.weight[lower / 2][lower % 2] = difference_noise.weight[c];
+    w.weight[upper / 2][upper % 2] = self_noise.weight[c];
   }
   refactor(&w);
-  for (int column = kAmbiguitySelf; column < kStates; ++column) move_rows(transition, column);
+  for (int column = kAmbiguitySelf; column < kStates; ++column) {
+    move_rows(kSelf, self, column);
+    move_rows(kDifference, difference, column);
+  }
 }
 
 // Modified weighted Gram-Schmidt, from the last row up.

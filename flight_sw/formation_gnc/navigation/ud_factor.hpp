@@ -33,7 +33,7 @@ struct SparseRow {
 struct OrbitTransition {
   flight_support::Mat3 rr, rv, vr, vv;  ///< ECI
   flight_support::Mat3 ra, va;          ///< RTN to ECI, scaled
-  double aa = 1.0;
+  flight_support::Vec3 aa;              ///< factor of each, by axis of RTN
 };
 
 /// Process noise of one orbit as nine weighted columns: three axes of RTN, three columns each.
@@ -62,8 +62,8 @@ class UdFactor {
   /// Forgets a state: independent of all others, with this variance > 0.
   void forget(int state, double variance);
   /// The orbits (self, difference) a step later. Clocks must have been forgotten.
-  void move_orbits(const OrbitTransition& transition, const OrbitNoise& self,
-                   const OrbitNoise& difference);
+  void move_orbits(const OrbitTransition& self, const OrbitTransition& difference,
+                   const OrbitNoise& self_noise, const OrbitNoise& difference_noise);
 
   double covariance(int i, int j) const;
   double variance(int state) const { return covariance(state, state); }
@@ -77,7 +77,7 @@ class UdFactor {
   static constexpr int pairs(int column) { return (column + 1) / 2; }
   void set(int i, int j, double value) { upper_[offset(j) + i / 2][i % 2] = value; }
 
-  void move_rows(const OrbitTransition& transition, int column);
+  void move_rows(int first, const OrbitTransition& transition, int column);
   struct Weighted;
   void refactor(Weighted* w);
 

@@ -112,6 +112,11 @@ TEST(FormationGncMessagesTest, ACommandAndTelemetryComeBackAsTheyWere) {
   t.late = 7;
   t.flags = 9;
   t.measurements_heard = 11;
+  t.drag_difference_mps2 = -2e-9;
+  t.graphic = {1000, 2, 990.5};
+  t.sdcp = {4'000'000'000u, 3, 4e9};
+  t.integer[0] = {32, -500'000'000'000};
+  t.integer[11] = {1, 7};
   unsigned char down[FORMATION_GNC_TELEMETRY_BYTES];
   formation_gnc_put_telemetry(down, &t);
   formation_gnc_telemetry u = {};
@@ -123,6 +128,15 @@ TEST(FormationGncMessagesTest, ACommandAndTelemetryComeBackAsTheyWere) {
   EXPECT_EQ(u.late, 7u);
   EXPECT_EQ(u.flags, 9u);
   EXPECT_EQ(u.measurements_heard, 11u);
+  EXPECT_EQ(u.drag_difference_mps2, -2e-9);
+  EXPECT_EQ(u.graphic.degrees, 1000u);
+  EXPECT_EQ(u.graphic.chi2, 990.5);
+  EXPECT_EQ(u.sdcp.degrees, 4'000'000'000u);
+  EXPECT_EQ(u.sdcp.rejected, 3u);
+  EXPECT_EQ(u.integer[0].prn, 32u);
+  EXPECT_EQ(u.integer[0].cycles, -500'000'000'000);
+  EXPECT_EQ(u.integer[11].cycles, 7);
+  EXPECT_EQ(u.integer[5].prn, 0u);
 }
 
 // A wrong bit anywhere, a byte less or more, one of our own: rejected, and nothing has changed.

@@ -106,6 +106,8 @@ TEST(OrbitPairTest, GradientIsThatOfCentralTermAndJ2) {
   }
 }
 
+const Vec3 kTau_s = vec3(200.0, 5700.0, 100.0);
+
 // Transition against the flow itself, by differences of trajectories 100 m and 0.1 m/s apart. The
 // gradient of the middle stands for all of the step; it turns by 3 n G at most, which dt^3 / 12
 // makes 7e-7 of rr and vv, and dt^4 / 24 of rv. Seen: 2e-7.
@@ -118,7 +120,7 @@ TEST(OrbitPairTest, TransitionIsTheDerivativeOfTheFlow) {
   reference.v[0] = reference.v[1] = v;
   coast(&reference, t_ns, 10.0, {}, &earth);
   const OrbitTransition t =
-      orbit_transition(0.5 * (r + reference.r[0]), 0.5 * (v + reference.v[0]), 10.0, 200.0);
+      orbit_transition(0.5 * (r + reference.r[0]), 0.5 * (v + reference.v[0]), 10.0, kTau_s);
   for (int j = 0; j < 3; ++j) {
     OrbitPair moved;
     moved.r[0] = moved.r[1] = r;
@@ -135,32 +137,53 @@ TEST(OrbitPairTest, TransitionIsTheDerivativeOfTheFlow) {
   }
 }
 
-// The noise against quadrature of its definition, P = q * integral of g g^T with g = (r, v, a) that
-// a unit impulse of acceleration builds up. The series end at x^2, x = dt/tau: 4e-4 at 15 s of 200
-// s.
+// The noise against quadrature of its definition, P = integral of q g g^T + w h h^T with g = (r, v,
+// a) that a unit impulse of the Gauss-Markov process's noise builds up, h that of a unit impulse.
+// The series end at x^2, x = dt/tau: 4e-4 at 15 s of 200 s, 3e-3 of 100 s.
 TEST(OrbitPairTest, NoiseIsTheIntegralOfItsDefinition) {
-  const double tau = 200.0, sigma = 2e-5, dt = 15.0, q = 2 * sigma * sigma / tau;
-  double expected[3][3] = {};
-  const int steps = 20000;
-  for (int k = 0; k < steps; ++k) {
-    const double s = dt * (k + 0.5) / steps, e = std::exp(-s / tau);
-    const double g[3] = {tau * tau * (s / tau - 1 + e), tau * (1 - e), e};
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) expected[i][j] += q * g[i] * g[j] * dt / steps;
-    }
-  }
-  const OrbitNoise noise = orbit_noise(flight_support::identity<3>(), dt, sigma, tau);
-  const int state[3] = {1, 4, 7};  // the second axis of r, v, a
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      double sum = 0.0;
-      for (int c = 0; c < 9; ++c) {
-        sum += noise.column[c][state[i]] * noise.weight[c] * noise.column[c][state[j]];
+  const double dt = 15.0;
+  const EmpiricalAcceleration empirical = {vec3(2e-5, 1e-9, 3e-7), kTau_s, vec3(0, 1e-16, 1e-11)};
+  const OrbitNoise noise = orbit_noise(flight_support::identity<3>(), dt, empirical);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double tau = kTau_s[axis], sigma = empirical.sigma_mps2[axis];
+    const double q = 2 * sigma * sigma / tau, w = empirical.white_m2ps3[axis];
+    double expected[3][3] = {};
+    const int steps = 20000;
+    for (int k = 0; k < steps; ++k) {
+      const double s = dt * (k + 0.5) / steps, e = std::exp(-s / tau);
+      const double g[3] = {tau * tau * (s / tau - 1 + e), tau * (1 - e), e}, h[3] = {s, 1, 0};
+      for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) {
+          expected[i][j] += (q * g[i] * g[j] + w * h[i] * h[j]) * dt / steps;
+        }
       }
-      EXPECT_NEAR(sum, expected[i][j], 5e-4 * std::sqrt(expected[i][i] * expected[j][j]));
+    }
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        double sum = 0.0;
+        for (int c = 0; c < 9; ++c) {
+          sum += noise.column[c][3 * i + axis] * noise.weight[c] * noise.column[c][3 * j + axis];
+        }
+        EXPECT_NEAR(sum, expected[i][j], 3e-3 * std::sqrt(expected[i][i] * expected[j][j])) << axis;
+      }
     }
   }
   for (double weight : noise.weight) EXPECT_GT(weight, 0.0);
+}
+
+// The empirical part of the transition: a constant acceleration of self for tau much longer than
+// the step moves by a dt^2/2 and a dt, less the decay's third of x = dt/tau: 1e-3.
+TEST(OrbitPairTest, EmpiricalAccelerationsDecayEachWithItsTimeConstant) {
+  const OrbitTransition t = orbit_transition(kPlace, vec3(0.0, 7.5e3, 100.0), 10.0, kTau_s);
+  const Mat3 R_IH = rtn_to_eci(kPlace, vec3(0.0, 7.5e3, 100.0));
+  for (int axis = 0; axis < 3; ++axis) {
+    const double x = 10.0 / kTau_s[axis];
+    EXPECT_NEAR(t.aa[axis], std::exp(-x), 1e-15);
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_NEAR(t.va(k, axis), 10.0 * (1 - x / 2 + x * x / 6) * R_IH(k, axis), 10 * x * x * x);
+      EXPECT_NEAR(t.ra(k, axis), 50.0 * (1 - x / 3 + x * x / 12) * R_IH(k, axis), 50 * x * x * x);
+    }
+  }
 }
 
 }  // namespace

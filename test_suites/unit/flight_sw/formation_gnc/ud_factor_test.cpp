@@ -110,13 +110,20 @@ TEST(UdFactorTest, OrbitsMoveAsTheFullMatrixDoes) {
   for (int clock = 0; clock < kClocks; ++clock) ud.forget(clock, 100.0);
   const flight_support::Vec3 r = flight_support::vec3(4.0e6, -3.2e6, 4.6e6);
   const flight_support::Vec3 v = flight_support::vec3(5.0e3, 5.7e3, -0.4e3);
-  const OrbitTransition t = orbit_transition(r, v, 10.0, 200.0);
   const flight_support::Mat3 R_IH = rtn_to_eci(r, v);
-  const OrbitNoise self = orbit_noise(R_IH, 10.0, 2e-1, 200.0);
-  const OrbitNoise difference = orbit_noise(R_IH, 10.0, 1e-2, 200.0);
+  const EmpiricalAcceleration fast = {
+      flight_support::vec3(2e-1, 2e-1, 1e-1), flight_support::vec3(200.0, 200.0, 200.0), {}};
+  const EmpiricalAcceleration slow = {flight_support::vec3(1e-2, 3e-2, 1e-2),
+                                      flight_support::vec3(200.0, 5700.0, 100.0),
+                                      flight_support::vec3(0.0, 1e-2, 0.0)};
+  const OrbitTransition t_self = orbit_transition(r, v, 10.0, fast.tau_s);
+  const OrbitTransition t_difference = with_time_constants(t_self, R_IH, 10.0, slow.tau_s);
+  const OrbitNoise self = orbit_noise(R_IH, 10.0, fast);
+  const OrbitNoise difference = orbit_noise(R_IH, 10.0, slow);
 
   Covariance Phi = Covariance::Identity(), Q = Covariance::Zero();
   for (int first : {kPositionSelf, kPositionDifference}) {
+    const OrbitTransition& t = first == kPositionSelf ? t_self : t_difference;
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) {
         Phi(first + i, first + j) = t.rr(i, j);
@@ -126,7 +133,7 @@ TEST(UdFactorTest, OrbitsMoveAsTheFullMatrixDoes) {
         Phi(first + 3 + i, first + 3 + j) = t.vv(i, j);
         Phi(first + 3 + i, first + 6 + j) = t.va(i, j);
       }
-      Phi(first + 6 + i, first + 6 + i) = t.aa;
+      Phi(first + 6 + i, first + 6 + i) = t.aa[i];
     }
     const OrbitNoise& noise = first == kPositionSelf ? self : difference;
     for (int c = 0; c < 9; ++c) {
@@ -135,7 +142,7 @@ TEST(UdFactorTest, OrbitsMoveAsTheFullMatrixDoes) {
     }
   }
   const Covariance expected = Phi * matrix_of(ud) * Phi.transpose() + Q;
-  ud.move_orbits(t, self, difference);
+  ud.move_orbits(t_self, t_difference, self, difference);
   EXPECT_LT(distance(matrix_of(ud), expected), kTolerance);
 }
 
