@@ -1,11 +1,14 @@
 // The class behind the flight ABI: ports in, ports out, one instance per spacecraft.
 //
-// Built once more for each of two defects that packages of this kind have had (Bell & D'Amico), so
-// that regression tests can show what catches them:
-//   FORMATION_GNC_DEFECT_NO_RETRANSMISSION  transitions are sent once and not waited for; the
-//   passive
-//                                           side takes it that it knows of each
-//   FORMATION_GNC_DEFECT_ORDERED_QUEUE      measurements are taken to arrive in the order sent
+// Built once more for each of five defects that packages of this kind have had (Bell & D'Amico), so
+// that regression tests can show what catches them, FORMATION_GNC_DEFECT_ and:
+//   NO_RETRANSMISSION  here: transitions are sent once and not waited for; the passive side takes it
+//                      that it knows of each
+//   ORDERED_QUEUE      here: measurements are taken to arrive in the order sent
+//   SWAPPED_STATES     navigation/integer_resolution.cpp: a satellite is taken to have the same
+//                      channel, and so the same place in the covariance, in both receivers
+//   ANGLE_WRAP         control/science_orbit.cpp: an angle that wraps within Newton's iteration
+//   HIDDEN_STATIC      support/orbit/earth_rotation.cpp: a cache that outlives its user
 
 #include <cassert>
 #include <cstring>

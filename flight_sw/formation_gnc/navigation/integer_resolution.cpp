@@ -1,5 +1,6 @@
 #include "formation_gnc/navigation/integer_resolution.hpp"
 
+#include <cassert>
 #include <cmath>
 
 #include "formation_gnc/navigation/lambda.hpp"
@@ -52,6 +53,36 @@ struct Problem {
   }
 };
 
+#ifdef FORMATION_GNC_DEFECT_SWAPPED_STATES
+// Of single differences. What self's receiver shares with the other one is looked up by self's
+// channel on both sides.
+double single_difference_covariance(const UdFactor& ud, const IntegerCandidate& a,
+                                    const IntegerCandidate& b) {
+  const int a_self = kAmbiguitySelf + a.channel_self, b_self = kAmbiguitySelf + b.channel_self;
+  return ud.covariance(kAmbiguityOther + a.channel_other, kAmbiguityOther + b.channel_other) +
+         ud.covariance(a_self, b_self) - ud.covariance(a_self, kAmbiguityOther + b.channel_self) -
+         ud.covariance(b_self, kAmbiguityOther + a.channel_self);
+}
+void swap_states(const IntegerCandidate& reference, const UdFactor& ud, Problem* p) {
+  const double base = single_difference_covariance(ud, reference, reference);
+  for (int i = 0; i < p->n; ++i) {
+    const double shared_i = single_difference_covariance(ud, p->difference[i], reference);
+    for (int j = 0; j <= i; ++j) {
+      p->q[i][j] = p->q[j][i] =
+          single_difference_covariance(ud, p->difference[i], p->difference[j]) - shared_i -
+          single_difference_covariance(ud, p->difference[j], reference) + base;
+    }
+  }
+}
+// A covariance has a factor.
+void expect_factor(const IntegerLeastSquares& s) {
+  assert(s.solved);
+}
+#else
+void swap_states(const IntegerCandidate&, const UdFactor&, Problem*) {}
+void expect_factor(const IntegerLeastSquares&) {}
+#endif
+
 Problem make_problem(const IntegerCandidate* candidates, int count,
                      const IntegerCandidate& reference, const UdFactor& ud) {
   Problem p;
@@ -72,6 +103,7 @@ Problem make_problem(const IntegerCandidate* candidates, int count,
       p.q[i][j] = p.q[j][i] = sum;
     }
   }
+  swap_states(reference, ud, &p);
   return p;
 }
 
@@ -141,6 +173,7 @@ IntegerChoice choose_integers(const IntegerCandidate* candidates, int count,
   Problem p = make_problem(candidates, count, reference, covariance);
   for (; p.n >= fewest && p.n > 0; p.drop(p.least_certain())) {
     const IntegerLeastSquares s = solve(p);
+    expect_factor(s);
     if (!s.solved) continue;
     choice.success_rate = s.success_rate;
     choice.ratio = ratio_of(s);

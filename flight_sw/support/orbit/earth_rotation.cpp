@@ -71,6 +71,23 @@ Nutation nutation(double t_cy) {
   return {longitude * 1e-4 * kArcsec_rad, obliquity * 1e-4 * kArcsec_rad};
 }
 
+#ifdef FORMATION_GNC_DEFECT_HIDDEN_STATIC
+// Summed anew every ten minutes; time goes on, and this is the only Earth.
+Nutation nutation_at(double t_cy) {
+  static double last_cy = -1.0;
+  static Nutation last;
+  if (last_cy < 0.0 || (t_cy - last_cy) * kCentury_d * kDay_s > 600.0) {
+    last = nutation(t_cy);
+    last_cy = t_cy;
+  }
+  return last;
+}
+#else
+Nutation nutation_at(double t_cy) {
+  return nutation(t_cy);
+}
+#endif
+
 // Aoki et al. (1982). The day and its fraction come apart, or the double loses 10 microseconds.
 double gmst_rad(double whole_days_since_J2000, double extra_days) {
   const double t_cy = (whole_days_since_J2000 + extra_days) / kCentury_d;
@@ -107,7 +124,7 @@ Mat3 ecef_to_eci(std::int64_t epoch_ns, const EarthTime& earth_time) {
   const double tt_cy = tt_centuries(epoch_ns);
 
   const double obliquity = mean_obliquity_rad(tt_cy);
-  const Nutation n = nutation(tt_cy);
+  const Nutation n = nutation_at(tt_cy);
   const Mat3 nutation_matrix = rotation_x(-obliquity - n.obliquity_rad) *
                                rotation_z(-n.longitude_rad) * rotation_x(obliquity);
   const double gast = gmst_rad(days, ut1_d) + n.longitude_rad * std::cos(obliquity);
