@@ -2,7 +2,7 @@
 // slew and a blackout (figure 23), the transfer from standby to science (figure 24), a science
 // campaign of ten observations. Bell & D'Amico; numbers in fixtures/missions.
 //
-// One seed each by default; --orrery_runs=100 flies the counts of the case study.
+// A seed or two each by default; --orrery_runs=100 flies the counts of the case study.
 #include <cmath>
 #include <optional>
 
@@ -195,71 +195,90 @@ TEST(VisorsNavigationStatisticsTest, CovarianceAndInnovationsAreHonest) {
 
 // ---- figure 24
 
-struct VisorsTransferTest : VisorsTest {
-  VisorsTransferTest() : VisorsTest(dispersed(options_of(GetParam()))) {}
+namespace {
 
-  /// The case study's: relative elements 5 m, mass 1 %, Cd 5 % of each, F10.7 10 %, 1 sigma. The
-  /// thruster, clocks, links and noise are dispersed by their models.
-  static FormationOptions dispersed(FormationOptions options) {
-    RandomStreams streams(options.run->seed);
-    RandomStream& draws = streams.stream("test", "transfer", "dispersion");
-    RelativeElements roe_m = missions::safe_ellipse_m(200);
-    for (double* element : {&roe_m.da, &roe_m.dl, &roe_m.dex, &roe_m.dey, &roe_m.dix, &roe_m.diy}) {
-      *element += draws.normal(0, 5);
-    }
-    options.roe_m = roe_m;
-    options.mass_kg = draws.normal(11, 0.11);
-    options.deputy_mass_kg = draws.normal(11, 0.11);
-    options.properties.drag_coefficient = draws.normal(2.2, 0.11);
-    options.deputy_properties = options.properties;
-    options.deputy_properties->drag_coefficient = draws.normal(2.2, 0.11);
-    const double f107_sfu = draws.normal(150, 15);
-    options.world.space_weather =
-        SpaceWeather::constant({.f107_sfu = f107_sfu, .f107a_sfu = f107_sfu, .ap_daily = 4});
-    return options;
+/// The case study's dispersions: relative elements 5 m, mass 1 %, Cd 5 % of each, F10.7 10 %,
+/// 1 sigma. The thruster, clocks, links and noise are dispersed by their models.
+void disperse_transfer(VisorsWorld& world) {
+  for (const char* name : {"dsc", "osc"}) {
+    world.spacecraft(name)
+        .disperse("mass_kg", Normal{11, 0.11})
+        .disperse("drag_coefficient", Normal{2.2, 0.11});
   }
-};
-
-TEST_P(VisorsTransferTest, ReachesTheScienceOrbitInTwentyHours) {
-  const Duration begin = 1h, arrival = begin + 20h;
-  command(10min, {.opcode = FORMATION_GNC_UPLOAD,
-                  .mode = FORMATION_GNC_TRANSFER,
-                  .number = 1,
-                  .t_ns = ns(begin),
-                  .end_ns = ns(arrival)});
-  run_for(arrival + 10min);
-
-  EXPECT_EQ(dsc.mode, std::uint32_t{FORMATION_GNC_TRANSFER});
-  EXPECT_EQ(osc.mode, std::uint32_t{FORMATION_GNC_TRANSFER});
-  const RelativeElements end_m = mean_roe_m();
-  const RelativeElements target_m = missions::science_orbit_m();
-  const double bound_mps =
-      missions::bound_sep_mps(missions::safe_ellipse_m(200), target_m, 6928137);
-  record_metric("bound_sep_mps", bound_mps);
-  record_metric("delta_v_mps", delta_v_mps("osc"));
-  record_metric("minimum_separation_m", minimum_separation_m);
-  record_metric("minimum_radial_normal_m", minimum_radial_normal_m);
-  record_metric("error_a_da_m", end_m.da - target_m.da);
-  record_metric("error_a_dl_m", end_m.dl - target_m.dl);
-  record_metric("error_a_dex_m", end_m.dex - target_m.dex);
-  record_metric("error_a_dey_m", end_m.dey - target_m.dey);
-  record_metric("error_a_dix_m", end_m.dix - target_m.dix);
-  record_metric("error_a_diy_m", end_m.diy - target_m.diy);
-  record_metric("burns", osc.burns);
-  // What a campaign begins from; de turns 3.4 deg a day, 1.4 m from the arrival to the observation
-  // that the goal is for, and science keeps to it from there.
-  EXPECT_LT(std::abs(end_m.da - target_m.da), 2);
-  EXPECT_LT(std::abs(end_m.dl - target_m.dl), 20);
-  EXPECT_LT(std::hypot(end_m.dex - target_m.dex, end_m.dey - target_m.dey), 5);
-  EXPECT_LT(std::hypot(end_m.dix - target_m.dix, end_m.diy - target_m.diy), 5);
-  EXPECT_LE(delta_v_mps("osc"), 1.2 * bound_mps);
-  EXPECT_EQ(delta_v_mps("dsc"), 0);
-  EXPECT_EQ(thruster("osc").rejected(), 0);
-  EXPECT_GT(minimum_radial_normal_m, 20);
-  expect_sound(*this);
+  const RelativeElements start_m = missions::safe_ellipse_m(200);
+  world.spacecraft("osc")
+      .disperse("roe/da_m", Normal{start_m.da, 5})
+      .disperse("roe/dl_m", Normal{start_m.dl, 5})
+      .disperse("roe/dex_m", Normal{start_m.dex, 5})
+      .disperse("roe/dey_m", Normal{start_m.dey, 5})
+      .disperse("roe/dix_m", Normal{start_m.dix, 5})
+      .disperse("roe/diy_m", Normal{start_m.diy, 5});
+  world.disperse("f107_sfu", Normal{150, 15});
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, VisorsTransferTest, Seeds(1));
+/// What no plan can be better than, about a circular orbit. Tangential and radial parts of all
+/// burns change a*de by at most 2/n each, normal parts a*di by at most 1/n, so the sums of their
+/// sizes are n |d a*de| / 2 and n |d a*di| at least; and the sum of sizes of vectors is at least
+/// the size of the vector of sums. Equality: all burns where both phases are, which parallel e and
+/// i vectors allow.
+double bound_joint_mps(const RelativeElements& from_m, const RelativeElements& to_m) {
+  const double n = std::sqrt(3.986004415e14 / 6928137) / 6928137;
+  return n * std::hypot(std::hypot(to_m.dex - from_m.dex, to_m.dey - from_m.dey) / 2,
+                        std::hypot(to_m.dix - from_m.dix, to_m.diy - from_m.diy));
+}
+
+void fly_transfer(RunId run) {
+  const Duration begin = 1h, arrival = begin + 20h;
+  VisorsWorld world(options_of(run));
+  disperse_transfer(world);
+  world.command(10min, {.opcode = FORMATION_GNC_UPLOAD,
+                        .mode = FORMATION_GNC_TRANSFER,
+                        .number = 1,
+                        .t_ns = world.ns(begin),
+                        .end_ns = world.ns(arrival)});
+  world.run_for(arrival + 10min);
+
+  EXPECT_EQ(world.dsc.mode, std::uint32_t{FORMATION_GNC_TRANSFER});
+  EXPECT_EQ(world.osc.mode, std::uint32_t{FORMATION_GNC_TRANSFER});
+  const RelativeElements error_m = world.mean_roe_m() - missions::science_orbit_m();
+  const double error_de_m = std::hypot(error_m.dex, error_m.dey);
+  const double error_di_m = std::hypot(error_m.dix, error_m.diy);
+  world.record_metric("delta_v_mps", world.delta_v_mps("osc"));
+  world.record_metric("minimum_separation_m", world.minimum_separation_m);
+  world.record_metric("minimum_radial_normal_m", world.minimum_radial_normal_m);
+  world.record_metric("error_a_da_m", std::abs(error_m.da));
+  world.record_metric("error_a_dl_m", std::abs(error_m.dl));
+  world.record_metric("error_a_de_m", error_de_m);
+  world.record_metric("error_a_di_m", error_di_m);
+  world.record_metric("burns", world.osc.burns);
+  // What a campaign begins from; de turns 3.4 deg a day, 1.4 m from the arrival to the observation
+  // that the goal is for, and science keeps to it from there.
+  EXPECT_LT(std::abs(error_m.da), 2);
+  EXPECT_LT(std::abs(error_m.dl), 20);
+  EXPECT_LT(error_de_m, 5);
+  EXPECT_LT(error_di_m, 5);
+  EXPECT_EQ(world.delta_v_mps("dsc"), 0);
+  EXPECT_EQ(world.thruster("osc").rejected(), 0);
+  EXPECT_GT(world.minimum_radial_normal_m, 20);
+  expect_sound(world);
+}
+
+}  // namespace
+
+// The mean, not each run: whoever starts 10 m further off has to pay for it.
+TEST(VisorsTransferCampaign, ReachesTheScienceOrbitInTwentyHoursAtTheExpectedCost) {
+  const RelativeElements from_m = missions::safe_ellipse_m(200), to_m = missions::science_orbit_m();
+  const double joint_mps = bound_joint_mps(from_m, to_m);
+  const double separate_mps = missions::bound_sep_mps(from_m, to_m, 6928137);
+  const int runs = flags().runs.value_or(2);
+  const Campaign campaign = fly_campaign(Runs{runs}, fly_transfer);
+  const CampaignMetric delta_v = campaign.metric("delta_v_mps");
+  std::printf("delta-v of %d runs: mean %.4f m/s, bounds %.4f joint, %.4f separate\n", runs,
+              delta_v.mean(), joint_mps, separate_mps);
+  EXPECT_GE(delta_v.mean(), joint_mps);
+  EXPECT_LE(delta_v.mean(), 1.2 * separate_mps);
+  EXPECT_EQ(campaign.passed().passed, campaign.passed().runs);
+}
 
 // ---- a science campaign
 
@@ -294,6 +313,10 @@ TEST_P(VisorsCampaignTest, ObservesEveryThirdOrbit) {
       worst.lateral_m = std::max(worst.lateral_m, s.lateral_m);
       worst.lateral_mps = std::max(worst.lateral_mps, s.lateral_mps);
     }
+    const std::string name = "observation_" + std::to_string(k + 1);
+    record_metric(name + "_longitudinal_m", worst.longitudinal_error_m);
+    record_metric(name + "_lateral_m", worst.lateral_m);
+    record_metric(name + "_lateral_mps", worst.lateral_mps);
     std::printf(
         "observation %2zu at %6.0f s: longitudinal %7.1f mm, lateral %6.1f mm, %6.3f mm/s%s\n",
         k + 1, 1e-9 * static_cast<double>(to_ns(observations[k].begin) - ns(0s)),
@@ -304,6 +327,7 @@ TEST_P(VisorsCampaignTest, ObservesEveryThirdOrbit) {
   record_metric("good_observations", good_observations());
   record_metric("minimum_separation_m", minimum_separation_m);
   record_metric("burns", osc.burns);
+  record_metric("delta_v_mps", delta_v_mps("osc"));
   EXPECT_GE(good_observations(), count == 10 ? 8 : 2);
   EXPECT_LE(delta_v_mps("osc"), 0.15);
   EXPECT_EQ(thruster("osc").rejected(), 0);
