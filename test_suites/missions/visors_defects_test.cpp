@@ -16,7 +16,6 @@ FormationOptions flown(const std::string& library, std::uint64_t seed) {
   FormationOptions options = options_of({.seed = seed});
   options.flight.library = library;
   options.world.gravity_degree = 8;  // what breaks is not the orbit
-  options.world.record = false;
   return options;
 }
 

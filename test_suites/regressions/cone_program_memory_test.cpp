@@ -5,6 +5,7 @@
 #include <orrery/orrery.hpp>
 
 #include <cmath>
+#include <map>
 
 #include "formation_gnc/control/reconfiguration_planner.hpp"
 #include "formation_gnc/control/science_orbit.hpp"
@@ -28,8 +29,9 @@ struct ConeProgramMemoryTest : FormationTest {
   }
 };
 
-// Standby to science. The planner's candidates are 120 s apart: 600 of them in 20 h.
-gnc::TransferPlan plan_transfer() {
+// Standby to science. The planner's candidates are 120 s apart: 600 of them in 20 h; fewer lie
+// further apart.
+gnc::TransferPlan plan_transfer(int most = kCandidates) {
   const std::int64_t epoch_ns = (2358LL * 604800 + 4 * 86400) * fs::kSecond_ns;
   gnc::TransferStart start;
   fs::OrbitElements& chief = start.orbit.chief;
@@ -48,7 +50,7 @@ gnc::TransferPlan plan_transfer() {
   const double dt_s = fs::seconds(goal.end_ns - epoch_ns);
   goal.a_roe = gnc::science_elements(fs::propagate_mean(chief, dt_s), sun, 40.0);
   gnc::TransferOptions options;
-  options.max_candidates = kCandidates;
+  options.max_candidates = most;
   options.limits.spacing_s = 120.0;
   options.last_ns = epoch_ns + 72000 * fs::kSecond_ns + 120 * fs::kSecond_ns;
   return gnc::ReconfigurationPlanner(options).plan(start, goal);
@@ -73,6 +75,21 @@ TEST_F(ConeProgramMemoryTest, SixHundredCandidatesFitIntoTwoMegabytes) {
   EXPECT_LT(heap("chief").heap_bytes(), 2500_kB);  // with holes; observed 1.59 MB
   record_metric("high_water_bytes", static_cast<double>(heap("chief").high_water_bytes()));
   record_metric("heap_bytes", static_cast<double>(heap("chief").heap_bytes()));
+}
+
+// What it takes grows with the number of candidates, not with its square: from 150 to 600 by 4 and
+// a little, where a full matrix grows by 16.
+TEST_F(ConeProgramMemoryTest, MemoryGrowsInProportionToTheCandidates) {
+  if (!heap_simulation_available()) GTEST_SKIP() << "no simulated heap";
+  const double resting = static_cast<double>(heap("chief").resting_bytes());
+  std::map<int, double> taken;  // beside what rests
+  for (const int most : {150, 300, 450, kCandidates}) {
+    flight("chief").run([most] { plan_transfer(most); });
+    taken[most] = static_cast<double>(heap("chief").high_water_bytes()) - resting;
+    record_metric("planner_bytes_" + std::to_string(most), taken[most]);
+  }
+  EXPECT_GT(taken[kCandidates], 2 * taken[150]);
+  EXPECT_LT(taken[kCandidates], 6 * taken[150]);
 }
 
 // 5 N rows and 4 N columns of 8 bytes: 57.6 MB, which the heap has not.
