@@ -265,7 +265,9 @@ void fly_transfer(RunId run) {
 
 }  // namespace
 
-// The mean, not each run: whoever starts 10 m further off has to pay for it.
+// The mean, not each run: whoever starts 10 m further off has to pay for it. The 5 m of the
+// dispersion cost n 5 m = 5.5 mm/s of a*di and half as much of a*de, 5.1 mm/s where both add up as
+// the bound says; the mean of few runs may be lower by 3 sigma of that.
 TEST(VisorsTransferCampaign, ReachesTheScienceOrbitInTwentyHoursAtTheExpectedCost) {
   const RelativeElements from_m = missions::safe_ellipse_m(200), to_m = missions::science_orbit_m();
   const double joint_mps = bound_joint_mps(from_m, to_m);
@@ -275,7 +277,7 @@ TEST(VisorsTransferCampaign, ReachesTheScienceOrbitInTwentyHoursAtTheExpectedCos
   const CampaignMetric delta_v = campaign.metric("delta_v_mps");
   std::printf("delta-v of %d runs: mean %.4f m/s, bounds %.4f joint, %.4f separate\n", runs,
               delta_v.mean(), joint_mps, separate_mps);
-  EXPECT_GE(delta_v.mean(), joint_mps);
+  EXPECT_GE(delta_v.mean(), joint_mps - 3 * 5.1e-3 / std::sqrt(runs));
   EXPECT_LE(delta_v.mean(), 1.2 * separate_mps);
   EXPECT_EQ(campaign.passed().passed, campaign.passed().runs);
 }
@@ -291,16 +293,16 @@ struct VisorsCampaignTest : VisorsTest {
         }()) {}
 };
 
-// Three observations by default, the ten of the case study when --orrery_runs asks for its counts.
+// Two observations by default, the ten of the case study when --orrery_runs asks for its counts.
 TEST_P(VisorsCampaignTest, ObservesEveryThirdOrbit) {
-  const unsigned count = flags().runs ? 10 : 3;
+  const unsigned count = flags().runs ? 10 : 2;
   command(10min, {.opcode = FORMATION_GNC_UPLOAD,
                   .mode = FORMATION_GNC_SCIENCE,
                   .observations = count,
                   .every = 3,
                   .number = 1});
   every(1s, [this] { expose(); });
-  run_for(count == 10 ? 50h : 15h);
+  run_for(count == 10 ? 50h : 10h);
 
   EXPECT_EQ(observations.size(), count);
   EXPECT_EQ(begun_dsc, begun_osc);
