@@ -8,10 +8,27 @@ endforeach()
 file(CREATE_LINK ${PROJECT_SOURCE_DIR}/fixtures/orrery.hpp ${ORRERY_INCLUDE_ROOT}/orrery/orrery.hpp
   SYMBOLIC)
 
-# orrery_library(name [EXPORT set]): the library orrery_<name> with the alias orrery::<name>. Installed
-# with orreryTargets, or with a set of its own where it needs what not every user has.
+# ORRERY_UNITY: compiling sources in batches takes a third of the time, since what they share is parsed and
+# instantiated once. Names in unnamed namespaces may then meet; sources with such names stand apart. One
+# build should be OFF or TESTS: it shows that each source of the libraries includes what it uses.
+set(ORRERY_UNITY OFF CACHE STRING "Compile in batches: OFF, TESTS (test sources alone) or ON")
+set_property(CACHE ORRERY_UNITY PROPERTY STRINGS OFF TESTS ON)
+function(orrery_compile_in_batches target)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+  # A source is no header because another one includes it.
+  target_compile_options(${target} PRIVATE $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-Wno-subobject-linkage>)
+endfunction()
+
+# orrery_apart(source...): sources of the folder at hand that are never compiled in a batch.
+function(orrery_apart)
+  set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+endfunction()
+
+# orrery_library(name [BATCHED] [EXPORT set]): the library orrery_<name> with the alias orrery::<name>. Installed
+# with orreryTargets, or with a set of its own where it needs what not every user has. BATCHED: see
+# ORRERY_UNITY.
 function(orrery_library name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "EXPORT" "")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "BATCHED" "EXPORT" "")
   add_library(orrery_${name} STATIC)
   add_library(orrery::${name} ALIAS orrery_${name})
   set_target_properties(orrery_${name} PROPERTIES EXPORT_NAME ${name} VERIFY_INTERFACE_HEADER_SETS ON)
@@ -19,6 +36,9 @@ function(orrery_library name)
   # Read by orrery::flight_abi; everything that links this library has it, too.
   set_target_properties(orrery_${name} PROPERTIES ORRERY_SIMULATOR ON INTERFACE_ORRERY_SIMULATOR ON
     COMPATIBLE_INTERFACE_BOOL ORRERY_SIMULATOR)
+  if(arg_BATCHED AND ORRERY_UNITY STREQUAL "ON")
+    orrery_compile_in_batches(orrery_${name})
+  endif()
   # Linked in the build tree only: neither flags nor warnings reach a consumer.
   target_link_libraries(orrery_${name} PRIVATE
     $<BUILD_INTERFACE:orrery_numerics> $<BUILD_INTERFACE:orrery_warnings>)
@@ -29,10 +49,13 @@ function(orrery_library name)
   endif()
 endfunction()
 
-# orrery_room(library ROOM wing/room HEADERS ... SOURCES ...): adds a room to a library. Headers are
-# public; paths are relative to the room.
+# orrery_room(library ROOM wing/room HEADERS ... SOURCES ... APART ...): adds a room to a library.
+# Headers are public; paths are relative to the room. APART: those of the sources that no batch takes in.
 function(orrery_room library)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "ROOM" "HEADERS;SOURCES")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "ROOM" "HEADERS;SOURCES;APART")
+  list(TRANSFORM arg_APART PREPEND ${PROJECT_SOURCE_DIR}/${arg_ROOM}/)
+  set_source_files_properties(${arg_APART} TARGET_DIRECTORY orrery_${library}
+    PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   list(TRANSFORM arg_HEADERS PREPEND ${ORRERY_INCLUDE_ROOT}/orrery/${arg_ROOM}/)
   list(TRANSFORM arg_SOURCES PREPEND ${PROJECT_SOURCE_DIR}/${arg_ROOM}/)
   target_sources(orrery_${library}
@@ -61,6 +84,9 @@ target_compile_options(orrery_test_options INTERFACE ${orrery_test_options}
 # Call it last: the options must follow those of everything else that the target links.
 function(orrery_compile_as_test name)
   target_link_libraries(${name} PRIVATE orrery_test_options)
+  if(ORRERY_UNITY)
+    orrery_compile_in_batches(${name})
+  endif()
 endfunction()
 
 # GoogleTest and the standard headers that tests use, parsed once for all suites. An executable, since a

@@ -10,8 +10,7 @@
 #include <map>
 #include <stdexcept>
 #include <string_view>
-
-extern char** environ;
+#include <unistd.h>
 
 namespace orrery {
 namespace {

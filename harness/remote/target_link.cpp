@@ -18,8 +18,6 @@
 #include <termios.h>
 #include <unistd.h>
 
-extern char** environ;
-
 namespace orrery {
 namespace {
 
