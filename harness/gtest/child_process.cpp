@@ -6,15 +6,15 @@
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <fcntl.h>
 #include <stdexcept>
 #include <string_view>
 #include <sys/personality.h>
 #include <sys/prctl.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <system_error>
 #include <unistd.h>
-
-extern char** environ;
 
 namespace orrery {
 namespace {
@@ -37,14 +37,20 @@ void turn_address_randomisation_round() {
   if (now != -1) personality(static_cast<unsigned long>(now) ^ ADDR_NO_RANDOMIZE);
 }
 
-// In the child, between fork and exec: nothing that allocates.
+// Not dup2: orrery::allocator stands in for it and looks the system's own up at the first call. Was
+// another thread doing so when this one forked, the child would wait for it for ever.
+void copy_descriptor(int from, int to) {
+  syscall(SYS_dup3, from, to, 0);
+}
+
+// In the child, between fork and exec: nothing that allocates, and no call that is interposed.
 [[noreturn]] void become(const char* program, const std::vector<char*>& arguments,
                          const std::vector<char*>& environment, int output, pid_t parent,
                          bool other_addresses) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(127);  // it died before the call
-  dup2(output, STDOUT_FILENO);
-  dup2(output, STDERR_FILENO);
+  copy_descriptor(output, STDOUT_FILENO);
+  copy_descriptor(output, STDERR_FILENO);
   if (other_addresses) turn_address_randomisation_round();
   execve(program, arguments.data(), environment.data());
   _exit(127);
@@ -91,11 +97,11 @@ ChildOutcome run_child(const ChildCommand& command) {
   const std::vector<char*> argv = pointers_to(arguments), envp = pointers_to(environment);
 
   int ends[2];
-  if (pipe(ends) != 0) throw std::runtime_error(std::string("run_child: ") + std::strerror(errno));
+  if (pipe2(ends, O_CLOEXEC) != 0)
+    throw std::runtime_error(std::string("run_child: ") + std::strerror(errno));
   const pid_t parent = getpid();
   const pid_t child = fork();
   if (child == 0) {
-    close(ends[0]);
     become(command.program.c_str(), argv, envp, ends[1], parent, command.other_addresses);
   }
   close(ends[1]);
