@@ -39,5 +39,6 @@ install(FILES
   DESTINATION ${orrery_package_dir})
 install(FILES   # built by users for other processors
   ${PROJECT_SOURCE_DIR}/flight_sw/abi/orrery_wire.c
+  ${PROJECT_SOURCE_DIR}/flight_sw/host/orrery_flight_library.h
   ${PROJECT_SOURCE_DIR}/flight_sw/host/orrery_flight_target.c
   DESTINATION ${orrery_package_dir}/target)

@@ -2,15 +2,13 @@
  * C99, dlopen and sockets; nothing of the simulator. One client at a time, each with the library
  * loaded anew. */
 #define _GNU_SOURCE
+#define PROGRAM "orrery-flight-target"
 #include <arpa/inet.h>
-#include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <signal.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -19,6 +17,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "orrery_flight_library.h"
 #include "orrery_wire.h"
 
 static const char kUsage[] =
@@ -36,11 +35,6 @@ typedef struct connection {
   int in, out;
   struct timespec begin;
 } connection;
-
-static void fail(const char* what, const char* about) {
-  fprintf(stderr, "orrery-flight-target: %s: %s\n", what, about);
-  exit(2);
-}
 
 static int32_t read_all(void* context, void* buffer, uint32_t bytes) {
   const connection* c = context;
@@ -87,16 +81,9 @@ static int serve(const char* path, int in, int out) {
   enum { kWork_bytes = 8 << 20 };
   connection c = {.in = in, .out = out};
   const orrery_wire_link link = {&c, read_all, write_all, call_begins, call_ended};
-  const orrery_flight* (*entry)(void);
-  const orrery_flight* flight;
-  void* work;
+  void *work, *library;
   int32_t status;
-  void* library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-  if (library == NULL) fail("no flight library", dlerror());
-  *(void**)&entry = dlsym(library, "orrery_flight_entry");
-  if (entry == NULL) fail("no orrery_flight_entry in", path);
-  flight = entry();
-  if (flight->abi_version != ORRERY_ABI_VERSION) fail("another version of the ABI in", path);
+  const orrery_flight* flight = open_flight_library(path, &library);
   work = malloc(kWork_bytes);
   if (work == NULL) fail("no memory for", path);
   status = orrery_wire_serve(&link, flight, work, kWork_bytes);
@@ -181,7 +168,7 @@ static int listen_tcp(char* where) {
       getsockname(fd, (struct sockaddr*)&address, &bytes) != 0) {
     fail("cannot listen", strerror(errno));
   }
-  fprintf(stderr, "orrery-flight-target: listens on port %d\n", ntohs(address.sin_port));
+  fprintf(stderr, PROGRAM ": listens on port %d\n", ntohs(address.sin_port));
   return fd;
 }
 
@@ -205,8 +192,8 @@ static int serve_listener(const char* path, int listener, int once) {
     close(fd);
     while (waitpid(child, &status, 0) < 0 && errno == EINTR) continue;
     if (WIFSIGNALED(status)) {
-      fprintf(stderr, "orrery-flight-target: flight code ended by signal %d (%s)\n",
-              WTERMSIG(status), strsignal(WTERMSIG(status)));
+      fprintf(stderr, PROGRAM ": flight code ended by signal %d (%s)\n", WTERMSIG(status),
+              strsignal(WTERMSIG(status)));
     }
   } while (!once);
   return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
