@@ -37,6 +37,7 @@ endfunction()
 
 function(orrery_cross_library name processor)
   set(sources "")
+  set(generated "")
   set(includes "$<TARGET_PROPERTY:${name},INCLUDE_DIRECTORIES>")
   get_target_property(links ${name} LINK_LIBRARIES)
   foreach(target IN ITEMS ${name} LISTS links)
@@ -47,6 +48,14 @@ function(orrery_cross_library name processor)
     get_target_property(folder ${target} SOURCE_DIR)
     if(NOT target STREQUAL name AND NOT type STREQUAL "STATIC_LIBRARY")
       continue()
+    endif()
+    # What a static library generates for itself, such as tables.
+    if(NOT target STREQUAL name)
+      list(APPEND includes "$<TARGET_PROPERTY:${target},INCLUDE_DIRECTORIES>")
+      get_target_property(first ${target} MANUALLY_ADDED_DEPENDENCIES)
+      if(first)
+        list(APPEND generated ${first})
+      endif()
     endif()
     get_target_property(files ${target} SOURCES)
     foreach(file IN LISTS files)
@@ -66,14 +75,15 @@ function(orrery_cross_library name processor)
     if(source MATCHES "\\.c$")
       set(compiler ${ORRERY_CROSS_CC_${processor}})
     else()
-      set(compiler ${ORRERY_CROSS_CXX_${processor}} -std=c++17)
+      # Notes that GCC 7 passes some classes otherwise than GCC 6 did: all of it is compiled here.
+      set(compiler ${ORRERY_CROSS_CXX_${processor}} -std=c++17 -Wno-psabi)
     endif()
     add_custom_command(OUTPUT ${object}
       COMMAND ${CMAKE_COMMAND} -E make_directory ${CMAKE_CURRENT_BINARY_DIR}/CMakeFiles/${name}.${processor}
       COMMAND ${compiler} -O2 -g -fPIC -fvisibility=hidden ${ORRERY_NUMERIC_FLAG_LIST}
         "-I$<JOIN:${includes},;-I>" -DORRERY_FLIGHT_BUILD
         -MMD -MF ${object}.d -c ${source} -o ${object}
-      DEPENDS ${source} DEPFILE ${object}.d
+      DEPENDS ${source} ${generated} DEPFILE ${object}.d
       COMMAND_EXPAND_LISTS VERBATIM
       COMMENT "Building ${processor} object of ${name}: ${file}")
     list(APPEND objects ${object})
