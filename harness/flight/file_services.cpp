@@ -7,81 +7,28 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <climits>
 #include <cstring>
 #include <fcntl.h>
 #include <functional>
-#include <stdio_ext.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
 namespace orrery::internal {
 namespace {
 
-constexpr int kFirst = 512, kEnd = 1024;  // descriptors
-constexpr std::int64_t kHere = -1;        // at the file's own offset
+// A part of a list that flight code handed in.
+iovec part_of(const iovec* parts, int i) {
+  iovec part;
+  copy_between(&part, parts + i, sizeof part);
+  return part;
+}
 
-// -1: no mode of fopen.
-int flags_of(const char* mode) {
-  const bool both = std::strchr(mode, '+') != nullptr;
-  const int exclusive = std::strchr(mode, 'x') != nullptr ? O_EXCL : 0;
-  const int direction = both ? O_RDWR : O_WRONLY;
-  switch (mode[0]) {
-    case 'r':
-      return both ? O_RDWR : O_RDONLY;
-    case 'w':
-      return direction | O_CREAT | O_TRUNC | exclusive;
-    case 'a':
-      return direction | O_CREAT | O_APPEND | exclusive;
-    default:
-      return -1;
-  }
+bool is_list(int parts, std::int64_t offset) {
+  return parts >= 0 && parts <= IOV_MAX && (offset >= 0 || offset == FileView::kHere);
 }
 
 }  // namespace
-
-// The C library's FILE over one of our descriptors.
-struct FileServices::Stream {
-  FileServices* services = nullptr;  // null: its process is dead
-  int fd = 0;
-  FILE* file = nullptr;
-  bool closed = false;
-  char buffer[4096];
-
-  static ssize_t read(void* cookie, char* to, std::size_t bytes) {
-    const Stream& s = *static_cast<Stream*>(cookie);
-    if (s.services == nullptr) return 0;
-    const long result = s.services->read(s.fd, to, bytes).value_or(-EBADF);
-    if (result < 0) errno = static_cast<int>(-result);
-    return result < 0 ? -1 : result;
-  }
-  static ssize_t write(void* cookie, const char* from, std::size_t bytes) {
-    const Stream& s = *static_cast<Stream*>(cookie);
-    if (s.services == nullptr) {
-      errno = EBADF;
-      return 0;
-    }
-    const long result = s.services->write(s.fd, from, bytes).value_or(-EBADF);
-    if (result < 0) errno = static_cast<int>(-result);
-    return result < 0 ? 0 : result;  // as fopencookie asks for
-  }
-  static int seek(void* cookie, off64_t* offset, int whence) {
-    const Stream& s = *static_cast<Stream*>(cookie);
-    if (s.services == nullptr) return 0;
-    const long result = s.services->seek(s.fd, *offset, whence).value_or(-EBADF);
-    if (result < 0) errno = static_cast<int>(-result);
-    if (result >= 0) *offset = result;
-    return result < 0 ? -1 : 0;
-  }
-  // The C library looks at the buffer no more.
-  static int close(void* cookie) {
-    Stream& s = *static_cast<Stream*>(cookie);
-    s.closed = true;
-    if (s.services == nullptr) return 0;
-    const SimulatorScope scope;
-    s.services->open_.erase(s.fd);  // and with it this one
-    return 0;
-  }
-};
 
 bool FileServices::OpenFile::readable() const {
   return (flags & O_ACCMODE) != O_WRONLY;
@@ -96,30 +43,6 @@ FileServices::FileServices(const FlightProcessOptions& options,
 
 FileServices::~FileServices() {
   close_all();
-}
-
-void FileServices::flush() {
-  for (int fd = kFirst; fd < kEnd; ++fd) {  // not by an iterator: flight code may close
-    const auto found = open_.find(fd);
-    if (found == open_.end() || found->second.stream == nullptr) continue;
-    std::fflush(found->second.stream->file);
-  }
-}
-
-void FileServices::close_all() {
-  for (auto& [fd, descriptor] : open_) {
-    if (descriptor.stream != nullptr) orphans_.push_back(std::move(descriptor.stream));
-  }
-  for (const std::shared_ptr<Stream>& stream : orphans_) {
-    stream->services = nullptr;
-    if (stream->closed) continue;
-    __fpurge(stream->file);
-    std::fclose(stream->file);
-  }
-  orphans_.clear();
-  open_.clear();
-  for (const Mapping& mapping : mappings_) munmap(mapping.begin, mapping.bytes);
-  mappings_.clear();
 }
 
 FileServices::OpenFile* FileServices::find(int fd) {
@@ -145,55 +68,52 @@ FileView::Result FileServices::close(int fd) {
   const auto found = open_.find(fd);
   if (found == open_.end()) return std::nullopt;
   const SimulatorScope scope;
-  if (std::shared_ptr<Stream>& stream = found->second.stream) {
-    stream->services = nullptr;
-    orphans_.push_back(std::move(stream));
-  }
+  orphan(std::move(found->second.stream));
   open_.erase(found);
   return 0;
 }
 
-FileView::Result FileServices::read(int fd, void* to, std::size_t bytes) {
-  return read_from(fd, to, bytes, kHere);
-}
-FileView::Result FileServices::write(int fd, const void* from, std::size_t bytes) {
-  return write_to(fd, from, bytes, kHere);
-}
-FileView::Result FileServices::read_at(int fd, void* to, std::size_t bytes, std::int64_t offset) {
-  if (offset < 0 && find(fd) != nullptr) return -EINVAL;
-  return read_from(fd, to, bytes, offset);
-}
-FileView::Result FileServices::write_at(int fd, const void* from, std::size_t bytes,
-                                        std::int64_t offset) {
-  if (offset < 0 && find(fd) != nullptr) return -EINVAL;
-  return write_to(fd, from, bytes, offset);
-}
-
-FileView::Result FileServices::read_from(int fd, void* to, std::size_t bytes, std::int64_t offset) {
+FileView::Result FileServices::read(int fd, const iovec* to, int parts, std::int64_t offset) {
   OpenFile* file = find(fd);
   if (file == nullptr) return std::nullopt;
   if (!file->readable()) return -EBADF;
   if (file->node->is_folder) return -EISDIR;
-  const std::uint64_t at = offset == kHere ? file->offset : static_cast<std::uint64_t>(offset);
+  if (!is_list(parts, offset)) return -EINVAL;
   const ByteBuffer& content = file->node->content;
-  if (at >= content.size()) return 0;
-  const std::size_t count = std::min<std::size_t>(bytes, content.size() - at);
-  copy_between(to, content.data() + at, count);
-  if (offset == kHere) file->offset = at + count;
-  return static_cast<long>(count);
+  const std::uint64_t begin = offset == kHere ? file->offset : static_cast<std::uint64_t>(offset);
+  std::uint64_t at = begin;
+  for (int i = 0; i < parts && at < content.size(); ++i) {
+    const iovec part = part_of(to, i);
+    const std::size_t count = std::min<std::size_t>(part.iov_len, content.size() - at);
+    copy_between(part.iov_base, content.data() + at, count);
+    at += count;
+  }
+  if (offset == kHere) file->offset = at;
+  return static_cast<long>(at - begin);
 }
 
-FileView::Result FileServices::write_to(int fd, const void* from, std::size_t bytes,
-                                        std::int64_t offset) {
+// One write to the medium, of however many parts.
+FileView::Result FileServices::write(int fd, const iovec* from, int parts, std::int64_t offset) {
   OpenFile* file = find(fd);
   if (file == nullptr) return std::nullopt;
   if (!file->writable()) return -EBADF;
-  if (bytes > files().capacity_bytes()) return -ENOSPC;
+  if (!is_list(parts, offset)) return -EINVAL;
+  std::size_t bytes = 0;
+  for (int i = 0; i < parts; ++i) {
+    const std::size_t count = part_of(from, i).iov_len;
+    if (count > files().capacity_bytes() - bytes) return -ENOSPC;
+    bytes += count;
+  }
   {
     const SimulatorScope scope;
     staging_.resize(bytes);
   }
-  copy_between(staging_.data(), from, bytes);
+  std::size_t staged = 0;
+  for (int i = 0; i < parts; ++i) {
+    const iovec part = part_of(from, i);
+    copy_between(staging_.data() + staged, part.iov_base, part.iov_len);
+    staged += part.iov_len;
+  }
   const SimulatorScope scope;
   std::uint64_t at = offset == kHere ? file->offset : static_cast<std::uint64_t>(offset);
   if ((file->flags & O_APPEND) != 0) at = file->node->content.size();
@@ -206,6 +126,38 @@ long FileServices::write_staged(OpenFile& file, std::uint64_t at) {
   const int error = memory_->write_file(*file.node, at, staging_, clock_.unix_now_ns());
   if (error == 0 && (file.flags & O_DSYNC) != 0) files().sync(*file.node);
   return error;
+}
+
+// Within the spacecraft's files only.
+FileView::Result FileServices::transfer(const char* function, int from, std::int64_t* from_offset,
+                                        int to, std::int64_t* to_offset, std::size_t bytes) {
+  OpenFile* in = find(from);
+  OpenFile* out = find(to);
+  if (in == nullptr && out == nullptr) return std::nullopt;
+  if (in == nullptr || out == nullptr) return refuse_between(function, from, to);
+  if (!in->readable() || !out->writable()) return -EBADF;
+  if (in->node->is_folder || (out->flags & O_APPEND) != 0) return -EINVAL;
+  auto read_at = static_cast<std::int64_t>(in->offset);
+  auto write_at = static_cast<std::int64_t>(out->offset);
+  if (from_offset != nullptr) copy_between(&read_at, from_offset, sizeof read_at);
+  if (to_offset != nullptr) copy_between(&write_at, to_offset, sizeof write_at);
+  if (read_at < 0 || write_at < 0) return -EINVAL;
+  const ByteBuffer& content = in->node->content;
+  const auto begin = std::min<std::size_t>(static_cast<std::size_t>(read_at), content.size());
+  const std::size_t count = std::min(bytes, content.size() - begin);
+  if (count == 0) return 0;
+  {
+    const SimulatorScope scope;
+    staging_.assign(content.data() + begin, content.data() + begin + count);
+    if (const long error = write_staged(*out, static_cast<std::uint64_t>(write_at))) return error;
+  }
+  read_at += static_cast<std::int64_t>(count);
+  write_at += static_cast<std::int64_t>(count);
+  if (from_offset == nullptr) in->offset = static_cast<std::uint64_t>(read_at);
+  if (to_offset == nullptr) out->offset = static_cast<std::uint64_t>(write_at);
+  if (from_offset != nullptr) copy_between(from_offset, &read_at, sizeof read_at);
+  if (to_offset != nullptr) copy_between(to_offset, &write_at, sizeof write_at);
+  return static_cast<long>(count);
 }
 
 FileView::Result FileServices::seek(int fd, std::int64_t offset, int whence) {
@@ -235,6 +187,37 @@ FileView::Result FileServices::resize(int fd, std::int64_t bytes) {
   if (!file->writable() || bytes < 0) return -EINVAL;
   const SimulatorScope scope;
   return files().resize(*file->node, static_cast<std::uint64_t>(bytes), clock_.unix_now_ns());
+}
+
+// Room for what is not written yet; a medium of this size has no other use for it than size.
+FileView::Result FileServices::allocate(int fd, int mode, std::int64_t offset, std::int64_t bytes) {
+  OpenFile* file = find(fd);
+  if (file == nullptr) return std::nullopt;
+  if (!file->writable()) return -EBADF;
+  std::int64_t end = 0;
+  if (offset < 0 || bytes <= 0) return -EINVAL;
+  if (__builtin_add_overflow(offset, bytes, &end)) return -EFBIG;
+  if (mode != 0) return -EOPNOTSUPP;
+  if (static_cast<std::uint64_t>(end) <= file->node->content.size()) return 0;
+  const SimulatorScope scope;
+  return files().resize(*file->node, static_cast<std::uint64_t>(end), clock_.unix_now_ns());
+}
+
+FileView::Result FileServices::space(int fd, struct statvfs* to) {
+  if (find(fd) == nullptr) return std::nullopt;
+  const struct statvfs medium = describe_medium();
+  copy_between(to, &medium, sizeof medium);
+  return 0;
+}
+
+// Counted in bytes.
+struct statvfs FileServices::describe_medium() {
+  struct statvfs medium {};
+  medium.f_bsize = medium.f_frsize = 1;
+  medium.f_blocks = files().capacity_bytes();
+  medium.f_bfree = medium.f_bavail = files().capacity_bytes() - files().used_bytes();
+  medium.f_namemax = 255;
+  return medium;
 }
 
 FileView::Result FileServices::status(int fd, struct stat* to) {
@@ -267,11 +250,15 @@ FileView::Result FileServices::duplicate_to(const char* function, int fd, int to
     open_[to].file = open_.at(fd).file;
     return to;
   }
+  return refuse_between(function, fd, to);
+}
+
+long FileServices::refuse_between(const char* function, int first, int second) {
   char refusal[160];
   std::snprintf(refusal, sizeof refusal,
                 "%s(%d, %d) called: between a file of this spacecraft (descriptors %d to %d) and "
                 "one of the host",
-                function, fd, to, kFirst, kEnd - 1);
+                function, first, second, kFirst, kEnd - 1);
   return end_call(refusal);
 }
 
@@ -360,95 +347,6 @@ FileView::Result FileServices::unmap(void* address, std::size_t bytes) {
   munmap(found->begin, found->bytes);
   mappings_.erase(found);
   return 0;
-}
-
-// ---- streams
-
-FileView::Result FileServices::open_stream(const char* function, const char* path, const char* mode,
-                                           FILE*& stream) {
-  const int flags = flags_of(mode);
-  if (flags < 0) return -EINVAL;
-  const Result fd = open(function, AT_FDCWD, path, flags);
-  return !fd || *fd < 0 ? fd : make_stream(static_cast<int>(*fd), mode, stream);
-}
-
-FileView::Result FileServices::open_stream(int fd, const char* mode, FILE*& stream) {
-  const auto found = open_.find(fd);
-  if (found == open_.end()) return std::nullopt;
-  if (flags_of(mode) < 0 || found->second.stream != nullptr) return -EINVAL;
-  return make_stream(fd, mode, stream);
-}
-
-long FileServices::make_stream(int fd, const char* mode, FILE*& stream) {
-  char kept_mode[8] = "";
-  copy_between(kept_mode, mode, strnlen(mode, sizeof kept_mode - 1));
-  const SimulatorScope scope;
-  auto made = std::make_shared<Stream>();
-  made->services = this;
-  made->fd = fd;
-  const cookie_io_functions_t functions = {Stream::read, Stream::write, Stream::seek,
-                                           Stream::close};
-  made->file = fopencookie(made.get(), kept_mode, functions);
-  if (made->file == nullptr) return -ENOMEM;
-  std::setvbuf(made->file, made->buffer, _IOFBF, sizeof made->buffer);
-  stream = made->file;
-  open_[fd].stream = std::move(made);
-  return 0;
-}
-
-FileView::Result FileServices::descriptor_of(FILE* stream) {
-  for (const auto& [fd, descriptor] : open_) {
-    if (descriptor.stream != nullptr && descriptor.stream->file == stream) return fd;
-  }
-  return std::nullopt;
-}
-
-// ---- folders
-
-// A DIR of ours is the address of its open file, which is of no use to anybody else.
-FileServices::OpenFile* FileServices::find_folder(DIR* folder, int* fd) {
-  for (auto& [number, descriptor] : open_) {
-    if (reinterpret_cast<DIR*>(descriptor.file.get()) != folder) continue;
-    if (fd != nullptr) *fd = number;
-    return descriptor.file.get();
-  }
-  return nullptr;
-}
-
-FileView::Result FileServices::open_folder(const char* function, const char* path, DIR*& folder) {
-  const Result fd = open(function, AT_FDCWD, path, O_RDONLY | O_DIRECTORY);
-  return !fd || *fd < 0 ? fd : open_folder(static_cast<int>(*fd), folder);
-}
-
-FileView::Result FileServices::open_folder(int fd, DIR*& folder) {
-  OpenFile* file = find(fd);
-  if (file == nullptr) return std::nullopt;
-  if (!file->node->is_folder) return -ENOTDIR;
-  folder = reinterpret_cast<DIR*>(file);
-  return 0;
-}
-
-FileView::Result FileServices::read_folder(DIR* folder, dirent*& entry) {
-  OpenFile* file = find_folder(folder);
-  if (file == nullptr) return std::nullopt;
-  entry = nullptr;
-  if (file->next_name == file->names.size()) return 0;
-  const SimulatorScope scope;
-  const std::string& name = file->names[file->next_name++];
-  const FlightFiles::NodePointer node = files().find(FlightFiles::normal(file->path, name));
-  file->entry = {};
-  file->entry.d_ino = node == nullptr ? 0 : node->number;
-  file->entry.d_reclen = sizeof file->entry;
-  file->entry.d_type = node != nullptr && node->is_folder ? DT_DIR : DT_REG;
-  name.copy(file->entry.d_name, sizeof file->entry.d_name - 1);
-  entry = &file->entry;
-  return 0;
-}
-
-FileView::Result FileServices::close_folder(DIR* folder) {
-  int fd = 0;
-  if (find_folder(folder, &fd) == nullptr) return std::nullopt;
-  return close(fd);
 }
 
 void install_file_view() {

@@ -39,7 +39,7 @@ inline constexpr bool kCanRefuse = true;
 ///           written when its process crashed is lost with it.
 /// Mappings  MAP_PRIVATE only: a copy of what the file holds at the call, in memory that is no heap
 ///           and goes with the process.
-/// Locks     of fcntl are granted: nobody else has these files.
+/// Locks     of fcntl, flock and lockf are granted: nobody else has these files.
 /// Calls     All functions of FileView are called as flight code, and by nobody else.
 class FileServices final : public FileView {
  public:
@@ -54,19 +54,23 @@ class FileServices final : public FileView {
 
   Result open(const char* function, int folder, const char* path, int flags) override;
   Result close(int fd) override;
-  Result read(int fd, void* to, std::size_t bytes) override;
-  Result write(int fd, const void* from, std::size_t bytes) override;
-  Result read_at(int fd, void* to, std::size_t bytes, std::int64_t offset) override;
-  Result write_at(int fd, const void* from, std::size_t bytes, std::int64_t offset) override;
+  Result read(int fd, const iovec* to, int parts, std::int64_t offset) override;
+  Result write(int fd, const iovec* from, int parts, std::int64_t offset) override;
+  Result transfer(const char* function, int from, std::int64_t* from_offset, int to,
+                  std::int64_t* to_offset, std::size_t bytes) override;
   Result seek(int fd, std::int64_t offset, int whence) override;
   Result sync(int fd) override;
   Result resize(int fd, std::int64_t bytes) override;
   Result resize(const char* function, const char* path, std::int64_t bytes) override;
+  Result allocate(int fd, int mode, std::int64_t offset, std::int64_t bytes) override;
+  Result space(int fd, struct statvfs* to) override;
+  Result space(const char* function, const char* path, struct statvfs* to) override;
   Result status(int fd, struct stat* to) override;
   Result status(const char* function, int folder, const char* path, struct stat* to) override;
   Result access(const char* function, int folder, const char* path) override;
   Result remove(const char* function, int folder, const char* path, Kind kind) override;
-  Result rename(const char* function, const char* from, const char* to) override;
+  Result rename(const char* function, int from_folder, const char* from, int to_folder,
+                const char* to) override;
   Result make_folder(const char* function, int folder, const char* path) override;
   Result open_stream(const char* function, const char* path, const char* mode,
                      FILE*& stream) override;
@@ -109,6 +113,7 @@ class FileServices final : public FileView {
     std::shared_ptr<Stream> stream = nullptr;
     int flags = 0;
   };
+  static constexpr int kFirst = 512, kEnd = 1024;  // descriptors
   struct Mapping {
     std::byte* begin;
     std::size_t bytes;  // in whole pages
@@ -132,9 +137,10 @@ class FileServices final : public FileView {
   long open_node(const std::string& path, int flags);
   long describe(const FlightFiles::Node& node, struct stat* to) const;
   long write_staged(OpenFile& file, std::uint64_t at);
-  Result read_from(int fd, void* to, std::size_t bytes, std::int64_t offset);
-  Result write_to(int fd, const void* from, std::size_t bytes, std::int64_t offset);
+  static long refuse_between(const char* function, int first, int second);
+  struct statvfs describe_medium();
   long make_stream(int fd, const char* mode, FILE*& stream);
+  void orphan(std::shared_ptr<Stream> stream);
   OpenFile* find(int fd);
   OpenFile* find_folder(DIR* folder, int* fd = nullptr);
   FlightFiles& files() { return memory_->files; }

@@ -155,14 +155,26 @@ FileView::Result FileServices::remove(const char* function, int folder, const ch
   });
 }
 
-FileView::Result FileServices::rename(const char* function, const char* from, const char* to) {
+FileView::Result FileServices::rename(const char* function, int from_folder, const char* from,
+                                      int to_folder, const char* to) {
   char text[kLongestPath];
   if (!copy_path(text, to)) return -ENAMETOOLONG;
-  return at_path(function, AT_FDCWD, from, [&](const std::string& full) -> long {
+  return at_path(function, from_folder, from, [&](const std::string& full) -> long {
     std::string target;
-    if (place_of(AT_FDCWD, text, target) != Place::kOurs) return -EXDEV;
+    if (place_of(to_folder, text, target) != Place::kOurs) return -EXDEV;
     return files().rename(full, target);
   });
+}
+
+FileView::Result FileServices::space(const char* function, const char* path, struct statvfs* to) {
+  struct statvfs medium {};
+  const Result result = at_path(function, AT_FDCWD, path, [&](const std::string& full) -> long {
+    if (files().find(full) == nullptr) return -ENOENT;
+    medium = describe_medium();
+    return 0;
+  });
+  if (result == 0) copy_between(to, &medium, sizeof medium);
+  return result;
 }
 
 FileView::Result FileServices::make_folder(const char* function, int folder, const char* path) {

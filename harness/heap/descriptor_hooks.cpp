@@ -1,6 +1,4 @@
 // dup, fcntl, mmap, mkstemp, chdir and their kin for a test program, as file_hooks.cpp.
-//
-// Not taken: readv, sendfile, flock and lockf, to which a descriptor of ours is EBADF.
 
 #include <orrery/harness/heap/file_call.hpp>
 

@@ -1,5 +1,5 @@
-/// How a hook asks the files of flight code, and else the C library: for file_hooks.cpp and
-/// descriptor_hooks.cpp.
+/// How a hook asks the files of flight code, and else the C library: for file_hooks.cpp,
+/// descriptor_hooks.cpp and transfer_hooks.cpp.
 #pragma once
 
 #include <orrery/harness/heap/interposition.hpp>
@@ -39,12 +39,37 @@ Function* system_function(const char* name) {
   return reinterpret_cast<Function*>(address);
 }
 
+inline FileView::Result read_one(FileView& view, int fd, void* to, std::size_t bytes,
+                                 std::int64_t offset) {
+  const iovec part = {to, bytes};
+  return view.read(fd, &part, 1, offset);
+}
+inline FileView::Result write_one(FileView& view, int fd, const void* from, std::size_t bytes,
+                                  std::int64_t offset) {
+  const iovec part = {const_cast<void*>(from), bytes};
+  return view.write(fd, &part, 1, offset);
+}
+// What a call comes to that changes nothing of a file of ours: `answer`, if the file is there.
+inline FileView::Result answer_for(FileView& view, int fd, long answer) {
+  struct stat found {};
+  const FileView::Result result = view.status(fd, &found);
+  return result == 0 ? FileView::Result(answer) : result;
+}
+// A negative offset of the caller's never means the file's own.
+inline std::int64_t not_here(off_t offset) {
+  return offset < 0 ? -1 : offset;
+}
+
 }  // namespace orrery::internal
 
 // Ours, or the C library's: `call` is asked of the view, `type` and `arguments` of the library.
-#define ORRERY_FILE_CALL(type, name, result, call, arguments)                     \
+#define ORRERY_FILE_CALL(type, name, result, call, arguments) \
+  ORRERY_RESULT_CALL(type, name, result, view->call, arguments)
+
+// The same with an expression that mentions `view`.
+#define ORRERY_RESULT_CALL(type, name, result, expression, arguments)             \
   if (FileView* view = files()) {                                                 \
-    if (const FileView::Result ours = view->call) return returned<result>(*ours); \
+    if (const FileView::Result ours = expression) return returned<result>(*ours); \
   }                                                                               \
   static const std::add_pointer_t<type> system = system_function<type>(#name);    \
   return system arguments

@@ -92,33 +92,35 @@ ORRERY_HOOK int close(int fd) {
 }
 
 ORRERY_HOOK ssize_t read(int fd, void* to, std::size_t bytes) {
-  ORRERY_FILE_CALL(ssize_t(int, void*, std::size_t), read, ssize_t, read(fd, to, bytes),
-                   (fd, to, bytes));
+  ORRERY_RESULT_CALL(ssize_t(int, void*, std::size_t), read, ssize_t,
+                     read_one(*view, fd, to, bytes, FileView::kHere), (fd, to, bytes));
 }
 
 ORRERY_HOOK ssize_t write(int fd, const void* from, std::size_t bytes) {
-  ORRERY_FILE_CALL(ssize_t(int, const void*, std::size_t), write, ssize_t, write(fd, from, bytes),
-                   (fd, from, bytes));
+  ORRERY_RESULT_CALL(ssize_t(int, const void*, std::size_t), write, ssize_t,
+                     write_one(*view, fd, from, bytes, FileView::kHere), (fd, from, bytes));
 }
 
 ORRERY_HOOK ssize_t pread(int fd, void* to, std::size_t bytes, off_t offset) {
-  ORRERY_FILE_CALL(ssize_t(int, void*, std::size_t, off_t), pread, ssize_t,
-                   read_at(fd, to, bytes, offset), (fd, to, bytes, offset));
+  ORRERY_RESULT_CALL(ssize_t(int, void*, std::size_t, off_t), pread, ssize_t,
+                     read_one(*view, fd, to, bytes, not_here(offset)), (fd, to, bytes, offset));
 }
 
 ORRERY_HOOK ssize_t pread64(int fd, void* to, std::size_t bytes, off_t offset) {
-  ORRERY_FILE_CALL(ssize_t(int, void*, std::size_t, off_t), pread64, ssize_t,
-                   read_at(fd, to, bytes, offset), (fd, to, bytes, offset));
+  ORRERY_RESULT_CALL(ssize_t(int, void*, std::size_t, off_t), pread64, ssize_t,
+                     read_one(*view, fd, to, bytes, not_here(offset)), (fd, to, bytes, offset));
 }
 
 ORRERY_HOOK ssize_t pwrite(int fd, const void* from, std::size_t bytes, off_t offset) {
-  ORRERY_FILE_CALL(ssize_t(int, const void*, std::size_t, off_t), pwrite, ssize_t,
-                   write_at(fd, from, bytes, offset), (fd, from, bytes, offset));
+  ORRERY_RESULT_CALL(ssize_t(int, const void*, std::size_t, off_t), pwrite, ssize_t,
+                     write_one(*view, fd, from, bytes, not_here(offset)),
+                     (fd, from, bytes, offset));
 }
 
 ORRERY_HOOK ssize_t pwrite64(int fd, const void* from, std::size_t bytes, off_t offset) {
-  ORRERY_FILE_CALL(ssize_t(int, const void*, std::size_t, off_t), pwrite64, ssize_t,
-                   write_at(fd, from, bytes, offset), (fd, from, bytes, offset));
+  ORRERY_RESULT_CALL(ssize_t(int, const void*, std::size_t, off_t), pwrite64, ssize_t,
+                     write_one(*view, fd, from, bytes, not_here(offset)),
+                     (fd, from, bytes, offset));
 }
 
 ORRERY_HOOK off_t lseek(int fd, off_t offset, int whence) noexcept {
@@ -233,8 +235,8 @@ ORRERY_HOOK int remove(const char* path) noexcept {
 }
 
 ORRERY_HOOK int rename(const char* from, const char* to) noexcept {
-  ORRERY_FILE_CALL(int(const char*, const char*), rename, int, rename("rename", from, to),
-                   (from, to));
+  ORRERY_FILE_CALL(int(const char*, const char*), rename, int,
+                   rename("rename", AT_FDCWD, from, AT_FDCWD, to), (from, to));
 }
 
 ORRERY_HOOK int mkdir(const char* path, mode_t mode) noexcept {

@@ -21,6 +21,8 @@ extern "C" [[gnu::weak]] bool orrery_services_are_virtual();
 extern "C" [[gnu::weak]] const char* orrery_service_hook_not_taken(std::size_t index);
 extern "C" [[gnu::weak]] const char* orrery_file_hook_not_taken(std::size_t index);
 extern "C" [[gnu::weak]] const char* orrery_descriptor_hook_not_taken(std::size_t index);
+extern "C" [[gnu::weak]] const char* orrery_transfer_hook_not_taken(std::size_t index);
+extern "C" [[gnu::weak]] const char* orrery_attribute_hook_not_taken(std::size_t index);
 
 namespace orrery {
 namespace internal {
@@ -106,6 +108,8 @@ std::string verify_interposition() {
   if (files_are_virtual()) {
     ask(orrery_file_hook_not_taken);
     ask(orrery_descriptor_hook_not_taken);
+    ask(orrery_transfer_hook_not_taken);
+    ask(orrery_attribute_hook_not_taken);
   }
   if (names.empty()) return "";
   return "these functions of the simulated heap are not reached by shared libraries: " + names +

@@ -11,6 +11,8 @@
 #include <optional>
 #include <string>
 #include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <sys/uio.h>
 
 namespace orrery {
 
@@ -74,20 +76,27 @@ class FileView {
   virtual ~FileView() = default;
   virtual Result open(const char* function, int folder, const char* path, int flags) = 0;
   virtual Result close(int fd) = 0;
-  virtual Result read(int fd, void* to, std::size_t bytes) = 0;
-  virtual Result write(int fd, const void* from, std::size_t bytes) = 0;
-  virtual Result read_at(int fd, void* to, std::size_t bytes, std::int64_t offset) = 0;
-  virtual Result write_at(int fd, const void* from, std::size_t bytes, std::int64_t offset) = 0;
+  /// All calls that read or write; `offset` kHere is the file's own, which moves on.
+  static constexpr std::int64_t kHere = INT64_MIN;
+  virtual Result read(int fd, const iovec* to, int parts, std::int64_t offset) = 0;
+  virtual Result write(int fd, const iovec* from, int parts, std::int64_t offset) = 0;
+  /// sendfile and copy_file_range; an offset that is null is the file's own.
+  virtual Result transfer(const char* function, int from, std::int64_t* from_offset, int to,
+                          std::int64_t* to_offset, std::size_t bytes) = 0;
   virtual Result seek(int fd, std::int64_t offset, int whence) = 0;
   virtual Result sync(int fd) = 0;
   virtual Result resize(int fd, std::int64_t bytes) = 0;
   virtual Result resize(const char* function, const char* path, std::int64_t bytes) = 0;
+  virtual Result allocate(int fd, int mode, std::int64_t offset, std::int64_t bytes) = 0;
+  virtual Result space(int fd, struct statvfs* to) = 0;
+  virtual Result space(const char* function, const char* path, struct statvfs* to) = 0;
   virtual Result status(int fd, struct stat* to) = 0;
   virtual Result status(const char* function, int folder, const char* path, struct stat* to) = 0;
   virtual Result access(const char* function, int folder, const char* path) = 0;
   enum class Kind : std::uint8_t { kFile, kFolder, kEither };
   virtual Result remove(const char* function, int folder, const char* path, Kind kind) = 0;
-  virtual Result rename(const char* function, const char* from, const char* to) = 0;
+  virtual Result rename(const char* function, int from_folder, const char* from, int to_folder,
+                        const char* to) = 0;
   virtual Result make_folder(const char* function, int folder, const char* path) = 0;
   /// fopen and fdopen: 0 and the stream, or minus errno.
   virtual Result open_stream(const char* function, const char* path, const char* mode,

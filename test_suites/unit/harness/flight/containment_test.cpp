@@ -111,6 +111,8 @@ INSTANTIATE_TEST_SUITE_P(
               "fault"},
         Fault{"IllegalInstruction", "!i", CrashKind::kSignal, SIGILL, "llegal instruction",
               "fault"},
+        Fault{"PageBehindItsFile", "!b", CrashKind::kSignal, SIGBUS, "us error at address",
+              "fault"},
         Fault{"StackOverflow", "!o", CrashKind::kStackOverflow, SIGSEGV, "is used up: Segmentation",
               "overflow"},
         Fault{"Raise", "!r", CrashKind::kSignal, SIGSEGV, "raised", "fault"},

@@ -151,6 +151,44 @@ TEST(FlightFilesTest, AFileDoesNotTakeTheNumberOfOneOfTheHosts) {
                         "to 1023) and one of the host"));
 }
 
+TEST(FlightFilesTest, ListsOfPartsAreReadAndWrittenAsOne) {
+  const auto process = booted(options({{"/data/", ""}}));
+  EXPECT_EQ(ask(*process, "parts /data/a"), "5|4bc,de|22da5|errno EINVAL|errno EINVAL|errno EBADF");
+  EXPECT_EQ(content(*process, "/data/a"), "abcdab");
+}
+
+TEST(FlightFilesTest, FilesAreCopiedWithinTheSpacecraftOnly) {
+  const auto process = booted(options({{"/data/a", "abcdef"}}));
+  EXPECT_EQ(ask(*process, "send /data/a /data/b"), "3 5|6|0|errno EBADF");
+  EXPECT_EQ(content(*process, "/data/b"), "cdeabcdef");
+  EXPECT_EQ(ask(*process, "copy_file /data/a /data/c"), "done");
+  EXPECT_EQ(content(*process, "/data/c"), "abcdef");
+  if (!heap_simulation_available()) return;  // under a sanitizer it fails with EPERM
+  EXPECT_THAT(ask(*process, "send_to_host /data/a"),
+              HasSubstr("sendfile(512, 1) called: between a file of this spacecraft"));
+}
+
+TEST(FlightFilesTest, LocksAreGrantedAndRoomIsTheMediums) {
+  FlightProcessOptions o = options({{"/data/a", "ab"}});
+  o.file_bytes = 100;
+  const auto process = booted(o);
+  EXPECT_EQ(ask(*process, "lock /data/a"), "done done errno EBADF");
+  EXPECT_EQ(ask(*process, "allocate /data/a"), "0 0 ENOSPC errno EOPNOTSUPP 0 100 94");
+  EXPECT_EQ(content(*process, "/data/a"), std::string("ab\0\0\0\0", 6));
+}
+
+// There are neither modes nor links: the first are taken and forgotten, the others refused.
+TEST(FlightFilesTest, AttributesMeanNothingAndLinksCannotBeMade) {
+  const auto process = booted(options({{"/data/a", "abc"}}));
+  EXPECT_EQ(ask(*process, "attributes /data/a /data/b"),
+            "done done errno EPERM errno EPERM errno EEXIST errno EINVAL done3 errno ENOTTY done "
+            "done");
+  EXPECT_EQ(content(*process, "/data/b"), "abc");
+  EXPECT_EQ(ask(*process, "attributes /data/a /data/b"),
+            "errno ENOENT errno ENOENT errno EEXIST errno EEXIST errno EPERM errno ENOENT errno "
+            "ENOENT0 errno EBADF errno EBADF errno ENOENT");
+}
+
 TEST(FlightFilesTest, AMappingIsAPrivateCopy) {
   if (!heap_simulation_available()) GTEST_SKIP() << "a sanitizer owns mmap";
   const auto process = booted(options({{"/data/a", "abcde"}}));

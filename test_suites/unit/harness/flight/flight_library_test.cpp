@@ -7,7 +7,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -16,6 +19,7 @@
 #include <stdexcept>
 #include <string>
 #include <sys/stat.h>
+#include <unistd.h>
 #include <vector>
 
 #include "orders.hpp"
@@ -200,15 +204,37 @@ TEST(LibraryClosureTest, NamesChangeInPlaceAndInEveryPart) {
   EXPECT_EQ(closure.parts[2].image.bytes().size(), size);
 }
 
-// Instances of 64 spacecraft at once, each with its own count.
+struct Host {
+  std::int64_t cpu_us = 0, resident_bytes = 0;
+
+  static Host now() {
+    timespec t{};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    std::int64_t total = 0, resident = 0;
+    std::ifstream("/proc/self/statm") >> total >> resident;
+    return {std::int64_t{t.tv_sec} * 1'000'000 + t.tv_nsec / 1000,
+            resident * sysconf(_SC_PAGESIZE)};
+  }
+};
+
+// Instances of 64 spacecraft at once, each with its own count. What one takes is said, and written
+// into the XML report: CPU time and resident memory, for its
+// library and two more that this one links.
 TEST(FlightLibraryTest, SixtyFourInstancesHaveGlobalsOfTheirOwn) {
   std::vector<std::unique_ptr<FlightProcess>> processes;
+  const Host before = Host::now();
   for (int i = 0; i < 64; ++i) {
     FlightProcessOptions o = options("flight_test_linked");
     o.spacecraft = "sc" + std::to_string(i);
     processes.push_back(std::make_unique<FlightProcess>(o));
     ASSERT_EQ(processes.back()->create(SimTime{}, 0), CallOutcome::kDone);
   }
+  const Host after = Host::now();
+  const auto us_each = static_cast<int>((after.cpu_us - before.cpu_us) / 64);
+  const auto bytes_each = static_cast<int>((after.resident_bytes - before.resident_bytes) / 64);
+  std::printf("  64 instances: %d us and %d bytes each\n", us_each, bytes_each);
+  RecordProperty("load_us_per_instance", us_each);
+  RecordProperty("bytes_per_instance", bytes_each);
   for (int i = 0; i < 64; ++i) {
     for (int n = 0; n < i % 3; ++n) count(*processes[static_cast<std::size_t>(i)]);
   }

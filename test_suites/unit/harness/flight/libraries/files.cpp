@@ -11,8 +11,13 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <sys/file.h>
+#include <sys/ioctl.h>
 #include <sys/mman.h>
+#include <sys/sendfile.h>
 #include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <sys/uio.h>
 #include <unistd.h>
 
 #include "orrery_flight.hpp"
@@ -187,6 +192,86 @@ std::string working_folder() {
   return text + std::string(same ? "" : " differs") + (fits ? " fits" : " " + failed());
 }
 
+// Three parts out and, past one byte, two parts in; then one more at an offset, and back.
+std::string in_parts(const std::string& path) {
+  const int fd = open(path.c_str(), O_RDWR | O_CREAT, 0644);
+  char one[] = "ab", two[] = "cde";
+  const iovec out[] = {{one, 2}, {nullptr, 0}, {two, 3}};
+  std::string text = std::to_string(writev(fd, out, 3));
+  lseek(fd, 1, SEEK_SET);
+  char first[2] = {}, rest[8] = {};
+  const iovec in[] = {{first, 2}, {rest, sizeof rest}};
+  const ssize_t read_on = readv(fd, in, 2);
+  text += "|" + std::to_string(read_on) + std::string(first, 2) + "," + rest;
+  const ssize_t written = pwritev(fd, out, 1, 4), read_at = preadv(fd, in, 1, 3);
+  text += "|" + std::to_string(written) + std::to_string(read_at) + std::string(first, 2) +
+          std::to_string(lseek(fd, 0, SEEK_CUR));
+  text += preadv(fd, in, 1, -1) < 0 ? "|" + failed() : "|read";
+  const volatile int too_many = IOV_MAX + 1;
+  text += readv(fd, in, too_many) < 0 ? "|" + failed() : "|read";
+  close(fd);
+  return text + (writev(fd, out, 3) < 0 ? "|" + failed() : "|written");
+}
+
+// By sendfile from an offset of its own, and by copy_file_range from the file's.
+std::string sent(const std::string& path, const std::string& other) {
+  const int from = open(path.c_str(), O_RDONLY);
+  const int to = open(other.c_str(), O_RDWR | O_CREAT, 0644);
+  off_t at = 2;
+  std::string text = std::to_string(sendfile(to, from, &at, 3));
+  text += " " + std::to_string(at);
+  text += "|" + std::to_string(copy_file_range(from, nullptr, to, nullptr, 100, 0));
+  text += "|" + std::to_string(copy_file_range(from, nullptr, to, nullptr, 100, 0));
+  text += sendfile(from, to, nullptr, 1) < 0 ? "|" + failed() : "|sent";
+  close(from);
+  close(to);
+  return text;
+}
+
+std::string locked(const std::string& path) {
+  const int fd = open(path.c_str(), O_RDWR);
+  const int other = open(path.c_str(), O_RDWR);
+  std::string text = done(flock(fd, LOCK_EX | LOCK_NB));
+  text += " " + done(lockf(other, F_TLOCK, 0));
+  close(other);
+  close(fd);
+  return text + " " + done(flock(fd, LOCK_UN));
+}
+
+std::string allocated(const std::string& path) {
+  const int fd = open(path.c_str(), O_RDWR);
+  std::string text = std::to_string(posix_fallocate(fd, 2, 4)) + " ";
+  text += std::to_string(posix_fallocate(fd, 0, 3)) + " ";
+  text += std::string(strerrorname_np(posix_fallocate(fd, 0, 1000))) + " ";
+  text += done(fallocate(fd, FALLOC_FL_KEEP_SIZE, 0, 8)) + " ";
+  text += std::to_string(posix_fadvise(fd, 0, 0, POSIX_FADV_SEQUENTIAL)) + " ";
+  close(fd);
+  const std::filesystem::space_info space = std::filesystem::space(path);
+  return text + std::to_string(space.capacity) + " " + std::to_string(space.available);
+}
+
+// What is there but means nothing, and what is not there.
+std::string attributes(const std::string& path, const std::string& other) {
+  const char* p = path.c_str();
+  const timespec times[2] = {};
+  std::string text = done(chmod(p, 0600));
+  text += " " + done(utimensat(AT_FDCWD, p, times, 0));
+  text += " " + done(symlink(p, other.c_str()));
+  text += " " + done(link(p, other.c_str()));
+  text += " " + done(link(other.c_str(), p));
+  char to[8];
+  text += readlink(p, to, sizeof to) < 0 ? " " + failed() : " link";
+  struct statx status {};
+  text += " " + done(statx(AT_FDCWD, p, 0, STATX_SIZE, &status));
+  text += std::to_string(status.stx_size);
+  const int fd = open(p, O_RDONLY);
+  text += " " + done(ioctl(fd, TIOCGWINSZ, to));
+  text += " " + done(fchmod(fd, 0600));
+  text += " " + done(renameat(AT_FDCWD, p, AT_FDCWD, other.c_str()));
+  close(fd);
+  return text;
+}
+
 FILE* left_open = nullptr;
 // Not null, which the undefined-behaviour sanitizer looks for; volatile against the compiler.
 const char* volatile nowhere = reinterpret_cast<const char*>(8);
@@ -254,6 +339,19 @@ std::string perform(const std::string& verb, const std::string& path, const std:
     char whole[PATH_MAX];
     return realpath(p, whole) == nullptr ? failed() : whole;
   }
+  if (verb == "parts") return in_parts(path);
+  if (verb == "send") return sent(path, text);
+  if (verb == "copy_file") {
+    std::error_code error;
+    std::filesystem::copy_file(path, text, error);
+    return error ? error.message() : "done";
+  }
+  if (verb == "send_to_host") {
+    return std::to_string(sendfile(1, open(p, O_RDONLY), nullptr, 1));
+  }
+  if (verb == "lock") return locked(path);
+  if (verb == "allocate") return allocated(path);
+  if (verb == "attributes") return attributes(path, text);
   if (verb == "many") {
     int opened = 0;
     while (open(p, O_RDONLY) >= 0) ++opened;

@@ -1,9 +1,11 @@
 /* Does as it is told: an input's first byte names one thing to do, the rest is its argument. One
  * letter each, so that a test reads as a list of orders. */
+#define _GNU_SOURCE /* memfd_create */
 #include <assert.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 
 #include "orrery_flight.h"
 #include "orrery_messages.h"
@@ -60,6 +62,11 @@ NOINLINE __attribute__((no_sanitize("undefined"))) static void fault(char how) {
     case 'i':
       __builtin_trap();
       break;
+    case 'b': { /* a page behind the end of its file */
+      const int empty = memfd_create("empty", 0);
+      *(volatile int*)mmap(NULL, 4096, PROT_READ | PROT_WRITE, MAP_SHARED, empty, 0) = 1;
+      break;
+    }
     case 'o':
       zero = overflow(local);
       break;
