@@ -1,4 +1,5 @@
 #include <orrery/harness/gtest/flags.hpp>
+#include <orrery/harness/gtest/host_conditions.hpp>
 #include <orrery/harness/gtest/listener.hpp>
 #include <orrery/harness/gtest/run_record.hpp>
 
@@ -237,6 +238,7 @@ Flags parse_flags(const std::vector<std::string>& arguments,
 }
 
 void Init(int* argc, char** argv) {
+  internal::fix_host_conditions(argv);
   std::vector<std::string> ours;
   int kept = *argc > 0 ? 1 : 0;
   for (int i = 1; i < *argc; ++i) {
