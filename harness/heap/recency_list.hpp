@@ -112,9 +112,12 @@ class RecencyList {
     if (slot + 1 == end_) return put(slot, block, size);
     if (slot + 2 == end_ && slot >= hot_) {
       const std::uint64_t front = entries_[slot + 1];
-      entries_[slot] = front;
-      area_.link(static_cast<HeapOffset>(front)) = mark(slot);
-      return put(slot + 1, block, size);
+      HeapArea::Link& front_mark = area_.link(static_cast<HeapOffset>(front));
+      if (front_mark == mark(slot + 1)) {  // else that is to be found, not mended
+        entries_[slot] = front;
+        front_mark = mark(slot);
+        return put(slot + 1, block, size);
+      }
     }
     entries_[slot] = 0;
     if (slot < hot_) --live_[slot / 64];

@@ -342,6 +342,28 @@ TEST(FirstFitHeapTest, FindsAWriteAfterFreeIntoTheLinks) {
   }
 }
 
+// The list moves what is in front when the second block grows or is split; that writes a link anew,
+// which must not hide what was written there.
+TEST(FirstFitHeapTest, AnOverwrittenLinkStaysSoWhenTheListMoves) {
+  for (const bool splits : {false, true}) {
+    TestHeap t(paper());
+    BlockHeap& heap = t.heap;
+    void* second = heap.allocate(100);
+    void* neighbour = heap.allocate(8);
+    heap.allocate(8);
+    void* front = heap.allocate(8);
+    heap.allocate(8);
+    heap.release(second);
+    heap.release(front);
+    std::memset(front, 0x55, 8);
+    splits ? static_cast<void>(heap.allocate(40)) : heap.release(neighbour);
+    EXPECT_EQ(t.faults, 0);
+    EXPECT_FALSE(heap.check());
+    EXPECT_EQ(t.last.kind, HeapFault::Kind::kCorruptBlock);
+    EXPECT_EQ(t.last.address, front);
+  }
+}
+
 TEST(FirstFitHeapTest, OptionsOutsideTheirRangesAreRefused) {
   TestArena arena(4096);
   EXPECT_THROW(make_heap(arena.base(), {.alignment = 4}), std::invalid_argument);
