@@ -5,6 +5,7 @@
 #include <orrery/harness/campaign/campaign_report.hpp>
 #include <orrery/harness/campaign/campaign_runner.hpp>
 #include <orrery/harness/campaign/slurm_script.hpp>
+#include <orrery/harness/gtest/host_conditions.hpp>
 
 #include <cstdio>
 #include <fstream>
@@ -97,6 +98,7 @@ int main(int argc, char** argv) {
     std::fputs(orrery::campaign_usage().c_str(), stdout);
     return 0;
   }
+  orrery::internal::fix_host_conditions(argv);  // once, for all runs
   try {
     return run(orrery::parse_campaign_options(arguments));
   } catch (const std::exception& error) {
