@@ -225,12 +225,26 @@ class TimeChart {
   constructor(parent, chart) {
     this.chart = chart;
     this.series = chart.series.map(s => ({name: s.name, v: unpack(s.values)}));
+    for (const {v} of this.series) this.findGaps(v);
     this.sigma = chart.sigma && unpack(chart.sigma);
     [this.caption, this.canvas] = figure(parent, chart.title + (chart.unit ? " [" + chart.unit + "]" : ""));
     this.keys = this.series.map((s, i) => key(this.caption, s.name, "--c" + (i + (chart.colour || 0)) % 6));
-    if (this.sigma) this.sigmaKey = key(this.caption, chart.sigma_name, "--band");
+    if (this.sigma) {
+      this.sigmaKey = key(this.caption, chart.sigma_name, "--band");
+      this.cutNote = element("span", this.caption, "", "key");
+    }
     if (chart.limit !== undefined) key(this.caption, chart.limit_name + " " + shown(chart.limit, chart.unit), "--bad");
     listen(this.canvas);
+  }
+  // No line across what lasts five times as long as usual, an outage say, and none at all through what
+  // comes at irregular times, as impulses do: points. Of bytes there is one, for a heap keeps its size
+  // from call to call.
+  findGaps(v) {
+    const lengths = v.t.slice(1).map((t, i) => t - v.t[i]).sort((a, b) => a - b);
+    const at = part => lengths[Math.floor(part * (lengths.length - 1))] ?? 0;
+    v.usual = at(0.5);
+    const irregular = lengths.length > 1 && at(0.9) > 3 * at(0.1);
+    v.gap = this.chart.unit === "bytes" ? Infinity : irregular ? 0 : 5 * v.usual || Infinity;
   }
   colour(i) { return colour(i + (this.chart.colour || 0)); }
   range() {
@@ -244,8 +258,9 @@ class TimeChart {
     };
     this.series.forEach(s => take(s.v, false));
     if (lo > hi) return [0, 1];
+    if (this.sigma) [lo, hi] = this.usual(lo, hi);
     // The band may be far wider than the error at first: it is not to flatten what is to be seen.
-    const reach = 3 * Math.max(Math.abs(lo), Math.abs(hi));
+    const reach = (this.cut ? 1 : 3) * Math.max(Math.abs(lo), Math.abs(hi));
     if (this.sigma) {
       const most = Math.max(0, ...this.sigma.hi.filter((_, i) => this.sigma.t[i] >= view[0] && this.sigma.t[i] <= view[1]));
       lo = Math.min(lo, -Math.min(most, reach));
@@ -255,6 +270,34 @@ class TimeChart {
     if (lo > 0 && lo < hi / 2) lo = 0;
     const pad = (hi - lo || Math.abs(hi) || 1) * 0.06;
     return [lo === 0 ? 0 : lo - pad, hi + pad];
+  }
+  // An error that is large for a moment, as before a filter has converged, would flatten all the rest
+  // into a line. Where it is five times what 95 % of the spans stay below, these fill the chart; what
+  // is beyond is marked at its edge and said beside the title. Zoomed in on, it is to be seen.
+  usual(lo, hi) {
+    const sizes = [];
+    let peak = 0;
+    this.cut = null;
+    for (const {v} of this.series) {
+      for (let i = Math.max(0, indexAt(v.t, view[0])); i < v.t.length && v.t[i] <= view[1]; ++i) {
+        if (v.lo[i] === null) continue;
+        const value = -v.lo[i] > v.hi[i] ? v.lo[i] : v.hi[i];
+        sizes.push(Math.abs(value));
+        if (Math.abs(value) > Math.abs(peak)) [peak, this.cut] = [value, {t: v.t[i], value}];
+      }
+    }
+    const most = sizes.sort((a, b) => a - b)[Math.floor(0.95 * (sizes.length - 1))];
+    if (sizes.length < 50 || most === 0 || Math.abs(peak) < 5 * most) this.cut = null;
+    return this.cut ? [Math.max(lo, -1.8 * most), Math.min(hi, 1.8 * most)] : [lo, hi];
+  }
+  // Ticks at the edge beyond which the curve goes on.
+  cutMarks(g, width, height, v, lo, hi, stroke) {
+    g.fillStyle = stroke;
+    v.t.forEach((t, i) => {
+      if (t < view[0] || t > view[1] || v.lo[i] === null) return;
+      if (v.hi[i] > hi) g.fillRect(xOf(t, width) - 1, 2, 3, 5);
+      if (v.lo[i] < lo) g.fillRect(xOf(t, width) - 1, height - 21, 3, 5);
+    });
   }
   draw(only) {
     const [g, width, height] = prepared(this.canvas, this.chart.height || 190);
@@ -283,6 +326,11 @@ class TimeChart {
       }
     });
     if (only !== undefined) return;
+    if (this.cut) this.series.forEach((s, i) => this.cutMarks(g, width, height, s.v, lo, hi, this.colour(i)));
+    if (this.cutNote) {
+      this.cutNote.textContent = !this.cut ? "" :
+        "off scale: up to " + shown(this.cut.value, this.chart.unit) + " " + this.chart.unit + " at " + clock(this.cut.t);
+    }
     drawCursor(g, width, height);
     this.series.forEach((s, i) => {
       const k = cursor === null ? -1 : indexAt(s.v.t, cursor);
@@ -306,9 +354,13 @@ class TimeChart {
   // a box, for where in it they lie is not known, and the line goes through the last of each.
   curve(g, width, yOf, v, stroke) {
     g.strokeStyle = g.fillStyle = stroke; g.lineWidth = 1.4; g.lineJoin = "round";
+    const alone = [];
     g.beginPath();
     for (let i = Math.max(0, indexAt(v.t, view[0])); i < v.t.length; ++i) {
-      const x = xOf(v.t[i], width), next = i + 1 < v.t.length ? xOf(v.t[i + 1], width) : x;
+      const before = i > 0 ? v.t[i] - v.t[i - 1] : Infinity, after = i + 1 < v.t.length ? v.t[i + 1] - v.t[i] : Infinity;
+      const x = xOf(v.t[i], width), next = after <= v.gap ? xOf(v.t[i + 1], width) : after < Infinity ? xOf(v.t[i] + v.usual, width) : x;
+      if (before > v.gap) g.moveTo(x, yOf(v.lo[i]));
+      if (before > v.gap && after > v.gap) alone.push([x, yOf(v.last[i])]);
       if (next - x > 3 && v.hi[i] !== v.lo[i]) {
         g.globalAlpha = 0.25;
         g.fillRect(x, yOf(v.hi[i]), next - x, yOf(v.lo[i]) - yOf(v.hi[i]));
@@ -324,9 +376,8 @@ class TimeChart {
     }
     g.stroke();
     g.lineWidth = 1;
-    if (v.t.length !== 1) return;
-    g.fillStyle = stroke;
-    g.beginPath(); g.arc(xOf(v.t[0], width), yOf(v.lo[0]), 2.5, 0, 7); g.fill();
+    if (v.t.length === 1) alone.push([xOf(v.t[0], width), yOf(v.lo[0])]);
+    for (const [x, y] of alone) { g.beginPath(); g.arc(x, y, 2.2, 0, 7); g.fill(); }
   }
 }
 
