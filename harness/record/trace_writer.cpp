@@ -49,7 +49,7 @@ void TraceWriter::moment(Track track, SimTime t, std::string_view name, const Js
   move_to(t);
   require(track, Holds::kMoments);
   open_event('X', track, t, name);
-  line_ += ",\"dur\":0.001";
+  line_ += ",\"cat\":\"message\",\"dur\":0.001";
   end_event(args);
 }
 

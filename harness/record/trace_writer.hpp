@@ -24,8 +24,9 @@ namespace orrery {
 /// Slices  B and E where something takes time, since a reset may cut it short; one at a time on a
 ///         track. X without duration where it takes none.
 /// Flows   s and f of one id, each within an X of the same instant, which it binds to. Such an X
-///         has 1 ns, the resolution, or there would be nothing to bind to; slices that take time
-///         could overlap it in part, so a track has the ones or the others.
+///         has 1 ns, the resolution, or there would be nothing to bind to, and the flow's category,
+///         by which Chrome's DevTools find it; slices that take time could overlap it in part, so
+///         a track has the ones or the others.
 /// Errors  Times must not go back, nor a track have both: std::logic_error. Failures to write:
 ///         std::runtime_error.
 class TraceWriter {

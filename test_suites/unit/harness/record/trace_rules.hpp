@@ -31,7 +31,7 @@ class TraceRules {
     auto& open = open_[track_];
     while (!open.empty() && open.back().end >= 0 && open.back().end <= ts) open.pop_back();
     if (phase == "B") {
-      open.push_back({-1});
+      open.push_back({-1, event.value("cat", "")});
     } else if (phase == "E") {
       end(open, event);
     } else if (phase == "X") {
@@ -61,6 +61,7 @@ class TraceRules {
   using Track = std::pair<int, int>;
   struct Open {
     long long end;  // -1: a B
+    std::string category = {};
   };
 
   void require(bool ok, const char* what, const nlohmann::json& event) {
@@ -88,10 +89,13 @@ class TraceRules {
     const auto end = ts + static_cast<long long>(event.value("dur", 0.0) * 1000 + 0.5);
     require(open.empty() || open.back().end < 0 || end <= open.back().end, "partial overlap",
             event);
-    open.push_back({end});
+    open.push_back({end, event.value("cat", "")});
   }
   void flow(const std::vector<Open>& open, bool begins, const nlohmann::json& event) {
     require(!open.empty(), "a flow outside of a slice", event);
+    // Perfetto takes the slice around it; Chrome's DevTools one of the same category alone.
+    require(open.empty() || open.back().category == event.value("cat", ""),
+            "a flow of another category than its slice", event);
     const std::string id = event.value("cat", "") + "/" + event.at("id").dump();
     if (begins) {
       require(used_.insert(id).second, "a flow id used twice", event);

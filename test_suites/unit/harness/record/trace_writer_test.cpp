@@ -175,6 +175,11 @@ TEST(TraceRulesTest, FindWhatIsWrong) {
             1u);
   // A flow without slice, and without end.
   EXPECT_EQ(with_names(R"(,{"ph":"s","cat":"m","id":1,"pid":1,"tid":1,"ts":3,"name":"b"})"), 2u);
+  // One whose slice has no category.
+  EXPECT_EQ(with_names(R"(,{"ph":"X","pid":1,"tid":1,"ts":3,"dur":1,"name":"a"},
+                           {"ph":"s","cat":"m","id":1,"pid":1,"tid":1,"ts":3,"name":"b"},
+                           {"ph":"f","cat":"m","bp":"e","id":1,"pid":1,"tid":1,"ts":3,"name":"b"})"),
+            2u);
 }
 
 }  // namespace
