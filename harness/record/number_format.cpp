@@ -8,6 +8,10 @@
 #include <stdexcept>
 #include <string_view>
 
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
+
 namespace orrery {
 
 namespace {
@@ -37,6 +41,36 @@ constexpr std::uint64_t kTenTo8 = 100'000'000, kTenTo16 = kTenTo8 * kTenTo8;
   return tens | (twos - 10 * tens) << 8;
 }
 
+struct TwoByEight {
+  std::uint64_t first, second;
+};
+
+// Digits of two numbers below 10^8 at once, in half the time on a processor that can: the same
+// divisions, in lanes of 32 and 16 bits.
+[[gnu::always_inline]] inline TwoByEight eight_digits_of_two(std::uint64_t a, std::uint64_t b) {
+#ifdef __SSE2__
+  const auto all = [](int lane) { return _mm_set1_epi32(lane); };
+  const __m128i values = _mm_set_epi64x(static_cast<long long>(b), static_cast<long long>(a));
+  // 3518437209 / 2^45 is 1e-4 to within 2^-32 of itself: exact for all numbers of 32 bits.
+  const __m128i tops =
+      _mm_srli_epi64(_mm_mul_epu32(values, all(static_cast<int>(3'518'437'209u))), 45);
+  const __m128i fours = _mm_or_si128(
+      tops, _mm_slli_epi64(_mm_sub_epi64(values, _mm_mul_epu32(tops, all(10'000))), 32));
+  // 5243 / 2^19 is exact for the hundreds of numbers below 10^4, 6554 / 2^16 for tens below 100.
+  const __m128i hundreds = _mm_srli_epi16(_mm_mulhi_epu16(fours, _mm_set1_epi16(5243)), 3);
+  const __m128i twos = _mm_or_si128(
+      hundreds,
+      _mm_slli_epi32(_mm_sub_epi16(fours, _mm_mullo_epi16(hundreds, _mm_set1_epi16(100))), 16));
+  const __m128i tens = _mm_mulhi_epu16(twos, _mm_set1_epi16(6554));
+  const __m128i digits = _mm_or_si128(
+      tens, _mm_slli_epi16(_mm_sub_epi16(twos, _mm_mullo_epi16(tens, _mm_set1_epi16(10))), 8));
+  return {static_cast<std::uint64_t>(_mm_cvtsi128_si64(digits)),
+          static_cast<std::uint64_t>(_mm_cvtsi128_si64(_mm_unpackhi_epi64(digits, digits)))};
+#else
+  return {eight_digits(a), eight_digits(b)};
+#endif
+}
+
 constexpr std::uint64_t kZeros = 0x3030'3030'3030'3030;
 
 void store(char* out, std::uint64_t digits) {
@@ -44,11 +78,14 @@ void store(char* out, std::uint64_t digits) {
 }
 
 // Of a number below 10^8, without zeros in front. Eight bytes are stored, whatever is returned.
-[[gnu::always_inline]] inline char* write_eight(char* out, std::uint64_t value) {
-  const std::uint64_t digits = eight_digits(value);
-  const int zeros = value == 0 ? 7 : std::countr_zero(digits) / 8;
+[[gnu::always_inline]] inline char* write_without_zeros(char* out, std::uint64_t digits) {
+  const int zeros = std::countr_zero(digits | std::uint64_t{1} << 56) / 8;
   store(out, (digits + kZeros) >> (8 * zeros));
   return out + (8 - zeros);
+}
+
+[[gnu::always_inline]] inline char* write_eight(char* out, std::uint64_t value) {
+  return write_without_zeros(out, eight_digits(value));
 }
 
 // 16 digits of a number below 10^16, zeros in front.
@@ -121,18 +158,22 @@ char* write_fixed(char* out, double value, int decimals) {
   }
   *out = '-';
   out += std::signbit(value) ? 1 : 0;
-  out = whole < kTenTo8 ? write_eight(out, whole) : write_number(out, whole);
+  // Those that tables use get by with fewer than 16 digits behind the point.
+  if (whole < kTenTo8 && decimals <= 9) {
+    const std::uint64_t last = decimals == 9 ? part % 10 : 0;
+    const std::uint64_t eight = decimals == 9 ? part / 10 : part * kIntegerPowersOfTen[8 - scale];
+    const TwoByEight digits = eight_digits_of_two(whole, eight);
+    out = write_without_zeros(out, digits.first);
+    if (decimals == 0) return out;
+    *out++ = '.';
+    store(out, digits.second + kZeros);
+    out[8] = static_cast<char>('0' + last);
+    return out + decimals;
+  }
+  out = write_number(out, whole);
   if (decimals == 0) return out;
   *out++ = '.';
-  // Those that tables use get by with fewer than 16 digits.
-  if (decimals <= 8) {
-    store(out, eight_digits(part * kIntegerPowersOfTen[8 - scale]) + kZeros);
-  } else if (decimals == 9) {
-    store(out, eight_digits(part / 10) + kZeros);
-    out[8] = static_cast<char>('0' + part % 10);
-  } else {
-    store_sixteen(out, part * kIntegerPowersOfTen[16 - scale]);
-  }
+  store_sixteen(out, part * kIntegerPowersOfTen[16 - scale]);
   return out + decimals;
 }
 

@@ -46,16 +46,17 @@ void append_components(std::string& line, const OemWriter::Components& values, i
 
 }  // namespace
 
-OemWriter::OemWriter(const std::filesystem::path& path, const OemObject& object, SimTime epoch)
+OemWriter::OemWriter(const std::filesystem::path& path, const OemObject& object,
+                     SimTime created_UTC)
     : file_(path), object_(object) {
   if (object_.id.empty()) object_.id = object_.name;
   check_text("OBJECT_NAME", object_.name);
   check_text("OBJECT_ID", object_.id);
   file_.write(
       "CCSDS_OEM_VERS = 2.0\n"
-      "COMMENT Simulated. CREATION_DATE is the start of the run in GPS time, so that equal\n"
-      "COMMENT runs give equal files.\n");
-  file_.write("CREATION_DATE = " + to_calendar(epoch) + "\nORIGINATOR = ORRERY\n");
+      "COMMENT Simulated. CREATION_DATE is the start of the run, so that equal runs give equal\n"
+      "COMMENT files.\n");
+  file_.write("CREATION_DATE = " + to_calendar(created_UTC) + "\nORIGINATOR = ORRERY\n");
 }
 
 void OemWriter::state(SimTime t, const Components& r_ECI, const Components& v_ECI) {

@@ -23,14 +23,15 @@ struct OemObject {
 /// Format  CCSDS 502.0-B-2 (2009), chapter 5. EME2000 about the Earth's centre, TIME_SYSTEM GPS,
 ///         km and km/s with 10 and 13 decimals (0.1 um, 0.1 nm/s): the standard allows 16 digits,
 ///         too few for a double; the CSV beside it has them all.
-/// Bytes   depend on the arguments alone: CREATION_DATE is the run's epoch, not the wall clock.
+/// Bytes   depend on the arguments alone: CREATION_DATE, in UTC as the standard has it, is the
+///         caller's, not the wall clock's.
 class OemWriter {
  public:
   using Components = std::array<double, 3>;  // x, y, z
 
   /// @throws std::invalid_argument  a name that is empty or not printable ASCII.
   ///         std::runtime_error     the file cannot be written.
-  OemWriter(const std::filesystem::path& path, const OemObject& object, SimTime epoch);
+  OemWriter(const std::filesystem::path& path, const OemObject& object, SimTime created_UTC);
 
   /// Adds a state, metres and m/s.
   /// @throws std::invalid_argument  a component not finite, or above 99999 km or 99 km/s; t not

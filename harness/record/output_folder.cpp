@@ -149,9 +149,11 @@ void OutputFolder::enter_branch(std::string_view name) {
   create_tree(partial_);
 }
 
-void OutputFolder::discard_branch(std::string_view name) noexcept {
-  std::error_code ignored;
-  fs::remove_all(hidden_branch(partial_, name), ignored);
+void OutputFolder::keep_unfinished_branch(std::string_view name) noexcept {
+  std::error_code error;
+  const fs::path folder = partial_ / ("branch-" + std::string(name));
+  fs::rename(hidden_branch(partial_, name), folder, error);
+  if (error) fs::create_directory(folder, error);  // it wrote nothing, or closed it and then died
 }
 
 // False: another run of this name was put in place meanwhile.

@@ -39,8 +39,9 @@ class OutputFolder {
   /// here on, which close() puts in its place there. The parent's lock stays the parent's.
   /// @throws as the constructor.
   void enter_branch(std::string_view name);
-  /// In the parent: removes what a branch left that did not close its folder.
-  void discard_branch(std::string_view name) noexcept;
+  /// In the parent, for a branch that did not close its folder: what it has written is in
+  /// `branch-<name>` all the same, as far as it came; nothing else tells why it ended.
+  void keep_unfinished_branch(std::string_view name) noexcept;
 
   /// Where the files are once closed.
   const std::filesystem::path& path() const { return path_; }

@@ -110,8 +110,8 @@ TEST_F(OemWriterTest, FileIsThatOfTheStandardToTheByte) {
   oem.close();
   EXPECT_EQ(content_of(path),
             "CCSDS_OEM_VERS = 2.0\n"
-            "COMMENT Simulated. CREATION_DATE is the start of the run in GPS time, so that equal\n"
-            "COMMENT runs give equal files.\n"
+            "COMMENT Simulated. CREATION_DATE is the start of the run, so that equal runs give equal\n"
+            "COMMENT files.\n"
             "CREATION_DATE = 2025-03-20T00:00:00.000000000\n"
             "ORIGINATOR = ORRERY\n"
             "\n"
