@@ -74,7 +74,7 @@ void TraceWriter::begin(Track track, SimTime t, std::string_view name, const Jso
   end(track, t);
   open_event('B', track, t, name);
   end_event(args);
-  open_.push_back({SimTime::max(), begun_++, track});
+  open_.push_back({SimTime::max(), begun_++, track, std::string(name)});
 }
 
 void TraceWriter::end(Track track, SimTime t) {
@@ -82,12 +82,13 @@ void TraceWriter::end(Track track, SimTime t) {
   const auto found = std::find_if(open_.begin(), open_.end(),
                                   [track](const Open& one) { return one.track == track; });
   if (found == open_.end()) return;
+  const Open one = *found;
   open_.erase(found);
-  write_end(track, t);
+  write_end(one, t);
 }
 
-void TraceWriter::write_end(Track track, SimTime t) {
-  open_event('E', track, t, {});
+void TraceWriter::write_end(const Open& one, SimTime t) {
+  open_event('E', one.track, t, one.name);
   end_event({});
 }
 
@@ -115,7 +116,7 @@ void TraceWriter::close(SimTime t) {
   move_to(t);
   std::sort(open_.begin(), open_.end(),
             [](const Open& a, const Open& b) { return a.number < b.number; });
-  for (const Open& one : open_) write_end(one.track, t);
+  for (const Open& one : open_) write_end(one, t);
   open_.clear();
   file_.write("\n]}\n");
   file_.close();
@@ -143,7 +144,7 @@ void TraceWriter::move_to(SimTime t) {
     if (due->until > t) break;
     const Open one = *due;
     open_.erase(due);
-    write_end(one.track, one.until);
+    write_end(one, one.until);
   }
   last_ = t;
 }
@@ -159,7 +160,6 @@ void TraceWriter::open_event(char phase, Track track, SimTime t, std::string_vie
   append_number(line_, std::int64_t{track.thread});
   line_ += ",\"ts\":";
   append_ts(t);
-  if (name.empty()) return;
   line_ += ",\"name\":";
   append_json_text(line_, name);
 }

@@ -22,7 +22,8 @@ namespace orrery {
 ///         Host times have no place in it.
 /// Tracks  pid: a spacecraft, tid: a process or device of it, both named by metadata (M).
 /// Slices  B and E where something takes time, since a reset may cut it short; one at a time on a
-///         track. X without duration where it takes none.
+///         track. Both have the name, which some readers want of an end, too. X without duration
+///         where it takes none.
 /// Flows   s and f of one id, each within an X of the same instant, which it binds to. Such an X
 ///         has 1 ns, the resolution, or there would be nothing to bind to, and the flow's category,
 ///         by which Chrome's DevTools find it; slices that take time could overlap it in part, so
@@ -71,7 +72,6 @@ class TraceWriter {
   void end_event(const JsonObject& args);
   void move_to(SimTime t);
   void append_ts(SimTime t);
-  void write_end(Track track, SimTime t);
 
   OutputFile file_;
   SimTime start_, last_;
@@ -88,7 +88,9 @@ class TraceWriter {
     SimTime until;
     std::uint64_t number;  // of its beginning: order among equal ends
     Track track;
+    std::string name;
   };
+  void write_end(const Open& one, SimTime t);
   std::vector<Open> open_;  // one per track at most
   std::uint64_t begun_ = 0;
 };

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <string>
 
 #include "scratch_folder.hpp"
@@ -72,21 +73,31 @@ double jumping(double t_s, int sample) {
   return middle ? 7.0 * (sample % 2) : 2.0;
 }
 
+// As a filter's error: metres until it has converged, within millimetres from there on.
+double converging(double t_s) {
+  return t_s < 600 ? -5 : 0.004 * std::sin(2 * M_PI * t_s / 20'000);
+}
+
 Report full_report() {
   Report report{.title = "ReportBrowserTest", .result = "failed", .length = kLength};
-  SeriesEnvelope a, b, sigma;
+  SeriesEnvelope a, b, c, sigma, burns;
   for (int i = 0; i <= 180'000; ++i) {
     a.add(i * 1s, slow(i));
     b.add(i * 1s, jumping(i, i));
+    c.add(i * 1s, converging(i));
     sigma.add(i * 1s, 3);
   }
+  for (const Duration t : {5h + 0s, 5h + 6min, 25h + 0s, 25h + 6min, 45h + 0s}) burns.add(t, 1);
   report.header = {{"seed", "1"}};
   report.host = {{"replay", "./test --gtest_filter='A.B' --orrery_seed=1 & more <of it>"}};
   report.table = {{"", "delta-v"}, {{"deputy", "0.3"}}};
   report.time_charts = {{.title = "Slow", .unit = "m", .series = {{"slow", a}}},
-                        {.title = "Jumping", .unit = "bytes", .series = {{"a", b}, {"b", a}}}};
+                        {.title = "Jumping", .unit = "bytes", .series = {{"a", b}, {"b", a}}},
+                        {.title = "Converging", .unit = "m", .series = {{"c", c}}},
+                        {.title = "Burns", .unit = "Ns", .series = {{"burns", burns}}}};
   report.time_charts[1].sigma = sigma;
   report.time_charts[1].limit = 60;
+  report.time_charts[2].sigma = sigma;
   report.origin = "chief";
   report.paths = {{"deputy", {}}};
   for (int i = 0; i < 100; ++i) {
@@ -108,7 +119,7 @@ std::pair<double, double> range_of(const std::string& name, double from_s, doubl
   double least = 1e9, most = -1e9;
   const double more = until_s - from_s;
   for (int i = static_cast<int>(from_s - more); i <= static_cast<int>(until_s + more); ++i) {
-    const double value = name == "a" ? jumping(i, i) : slow(i);
+    const double value = name == "a" ? jumping(i, i) : name == "c" ? converging(i) : slow(i);
     least = std::min(least, value);
     most = std::max(most, value);
   }
@@ -129,13 +140,14 @@ TEST(ReportBrowserTest, EveryPlotShowsItsData) {
     titles.push_back(chart["title"]);
     EXPECT_GT(chart["painted"].get<int>(), 500) << chart["title"];
   }
-  EXPECT_THAT(titles,
-              testing::UnorderedElementsAre(
-                  "Along track and radial", "Cross track and radial", "Along track and cross track",
-                  "Modes", "Slow [m]", "Jumping [bytes]", "Link chief-deputy", "Heap of deputy"));
+  EXPECT_THAT(titles, testing::UnorderedElementsAre(
+                          "Along track and radial", "Cross track and radial",
+                          "Along track and cross track", "Modes", "Slow [m]", "Jumping [bytes]",
+                          "Converging [m]", "Burns [Ns]", "Link chief-deputy", "Heap of deputy"));
   int points = 0;
   for (const auto& chart : page["charts"]) {
     for (const auto& series : chart["series"]) {
+      if (series["name"] == "burns") continue;
       // Half of the line's 1.4 px, half a pixel of rounding, and the blurred edge.
       const double tolerance = 2 * series["pixel"].get<double>();
       for (const auto& point : series["points"]) {
@@ -146,7 +158,21 @@ TEST(ReportBrowserTest, EveryPlotShowsItsData) {
       }
     }
   }
-  EXPECT_EQ(points, 3 * 7) << "seven columns of each curve";
+  EXPECT_EQ(points, 4 * 7) << "seven columns of each curve";
+  std::map<std::string, nlohmann::json> series;
+  for (const auto& chart : page["charts"]) {
+    for (const auto& one : chart["series"]) series[one["name"]] = one;
+  }
+  // The first ten minutes do not flatten the other 50 h: a chart of 5 m would have pixels of 30 mm.
+  EXPECT_LT(series["c"]["pixel"].get<double>(), 2e-4);
+  // Points at 5 h, 25 h and 45 h, of the columns that are measured; no line between them.
+  ASSERT_EQ(series["burns"]["points"].size(), 3u) << series["burns"];
+  for (const auto& point : series["burns"]["points"]) {
+    // Of 2.2 px radius.
+    const double tolerance = 4 * series["burns"]["pixel"].get<double>();
+    EXPECT_NEAR(point["least"].get<double>(), 1, tolerance);
+    EXPECT_NEAR(point["most"].get<double>(), 1, tolerance);
+  }
 }
 
 }  // namespace

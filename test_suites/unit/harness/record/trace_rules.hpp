@@ -43,7 +43,7 @@ class TraceRules {
     } else {
       require(phase == "i" && event.value("s", "") == "t", "another phase", event);
     }
-    if (phase != "E") require(!event.value("name", "").empty(), "no name", event);
+    require(!event.value("name", "").empty(), "no name", event);
   }
 
   std::vector<std::string> finish() {

@@ -167,11 +167,11 @@ TEST(TraceRulesTest, FindWhatIsWrong) {
                            {"ph":"i","s":"t","pid":1,"tid":1,"ts":1,"name":"a"})"),
             1u);
   EXPECT_EQ(with_names(R"(,{"ph":"B","pid":1,"tid":1,"ts":2,"name":"a"})"), 1u);
-  EXPECT_EQ(with_names(R"(,{"ph":"E","pid":1,"tid":1,"ts":2})"), 1u);
+  EXPECT_EQ(with_names(R"(,{"ph":"E","pid":1,"tid":1,"ts":2,"name":"a"})"), 1u);
   // An X across the end of the slice that it began in.
   EXPECT_EQ(with_names(R"(,{"ph":"B","pid":1,"tid":1,"ts":2,"name":"a"},
                            {"ph":"X","pid":1,"tid":1,"ts":3,"dur":2,"name":"b"},
-                           {"ph":"E","pid":1,"tid":1,"ts":4})"),
+                           {"ph":"E","pid":1,"tid":1,"ts":4,"name":"a"})"),
             1u);
   // A flow without slice, and without end.
   EXPECT_EQ(with_names(R"(,{"ph":"s","cat":"m","id":1,"pid":1,"tid":1,"ts":3,"name":"b"})"), 2u);
