@@ -30,28 +30,44 @@ class SignalsBlocked {
 }  // namespace
 
 CallQueue::~CallQueue() {
-  if (getpid() != process_ && thread_.joinable()) {
-    thread_.detach();  // of another process
-    return;
-  }
   try {
     finish();
   } catch (...) {
+    end_thread();
   }
 }
 
+// In a child that was made while the thread ran, and has no such thread.
+bool CallQueue::is_orphan() const {
+  return thread_.joinable() && getpid() != process_;
+}
+
 void CallQueue::finish() {
-  if (open_.used > 0) hand_over();
-  if (thread_.joinable()) {
-    {
-      const std::lock_guard lock(mutex_);
-      is_ending_ = true;
-    }
-    has_full_.notify_one();
-    thread_.join();
-    is_ending_ = false;
+  if (is_orphan()) {
+    open_.used = 0;
+    thread_.detach();
+    return;
   }
+  if (open_.used > 0 && !has_failed()) hand_over();
+  end_thread();
   rethrow_error();
+}
+
+// When it has made all calls that it was given.
+void CallQueue::end_thread() {
+  if (!thread_.joinable()) return;
+  {
+    const std::lock_guard lock(mutex_);
+    is_ending_ = true;
+  }
+  has_full_.notify_one();
+  thread_.join();
+  is_ending_ = false;
+}
+
+bool CallQueue::has_failed() {
+  const std::lock_guard lock(mutex_);
+  return error_ != nullptr;
 }
 
 void CallQueue::next_block(std::size_t bytes) {
@@ -72,7 +88,7 @@ void CallQueue::next_block(std::size_t bytes) {
 }
 
 void CallQueue::hand_over() {
-  if (getpid() != process_ && thread_.joinable()) {
+  if (is_orphan()) {
     open_.used = 0;
     return;
   }

@@ -133,6 +133,9 @@ class CallQueue {
   void hand_over();
   void make_calls();
   void make_calls_of(const Block& block);
+  bool is_orphan() const;
+  void end_thread();
+  bool has_failed();
   void rethrow_error();
 
   Block open_;         // being filled

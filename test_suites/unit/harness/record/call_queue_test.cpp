@@ -104,6 +104,18 @@ TEST(CallQueueTest, AnErrorEndsTheCallsAndIsThrownHere) {
   EXPECT_EQ(listener.numbers.size(), 3u);
 }
 
+// Whoever gives up goes without finish(), and the queue with the thread still there.
+TEST(CallQueueTest, GoesQuietlyAfterAnError) {
+  Listener listener;
+  {
+    CallQueue queue;
+    queue.put(listener, &Listener::refuse_from, 0, 0);
+    EXPECT_THROW(for (int i = 0; i < 400'000; ++i) queue.put(listener, &Listener::number, i),
+                 std::runtime_error);
+  }
+  EXPECT_TRUE(listener.numbers.empty());
+}
+
 // As a world's branches do: both processes go on with calls of their own.
 TEST(CallQueueTest, BothSidesOfAForkGoOn) {
   Listener listener;
@@ -133,6 +145,7 @@ TEST(CallQueueTest, AChildWithoutTheThreadDropsItsCalls) {
   if (child == 0) {
     const std::size_t before = listener.numbers.size();
     for (int i = 0; i < 400'000; ++i) queue.put(listener, &Listener::number, i);
+    queue.finish();
     _exit(listener.numbers.size() == before ? 0 : 1);
   }
   queue.finish();
