@@ -211,8 +211,8 @@ def exchange(axes, flown, sender, window, colour_of):
     """
     low, high = window
     top, bottom = 1.0, 0.0
-    for sent, received, size in flown:
-        colour = colour_of(sent, size)
+    shown = [(colour_of(sent, size), sent, received) for sent, received, size in flown]
+    for colour, sent, received in sorted(shown, key=lambda one: one[0] != PALE):
         if colour is None or not low <= sent <= high:
             continue
         width = 1.0 if colour == PALE else 1.8

@@ -132,7 +132,7 @@ TEST_P(VisorsNavigationTest, FindsTheIntegersAndStandsASlewWithABlackout) {
   expect_sound(*this);
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, VisorsNavigationTest, Seeds(2));
+INSTANTIATE_TEST_SUITE_P(Seeds, VisorsNavigationTest, Seeds(1));
 
 // The filter knows how good it is: errors over its own sigmas, in RTN, from 10 min on, and its
 // innovations, over all seeds together. Three of them here, 100 by --orrery_runs=100.
