@@ -1,0 +1,111 @@
+#include "rpo_kit/guidance/approach.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "support/orbit/constants.hpp"
+
+namespace rpo_kit {
+
+using namespace flight_support;
+
+namespace {
+
+std::int64_t revolutions_ns(const OrbitElements& chief, double rev) {
+  return nanoseconds(rev * kTwoPi / secular_rates(chief).u_radps);
+}
+
+}  // namespace
+
+RelativeElements Approach::goal(const RelativeOrbit& now) const {
+  const Waypoint& waypoint = options_.plan.waypoints[waypoint_];
+  const double phase = has_phase_ ? phase_rad_ : common_phase_rad(now.a_roe);
+  return safe_orbit(waypoint.along_track_m, waypoint.radius_m, phase);
+}
+
+bool Approach::reached(const RelativeOrbit& now) const {
+  const Waypoint& waypoint = options_.plan.waypoints[waypoint_];
+  const RelativeElements miss = now.a_roe - goal(now);
+  const double across = options_.tolerance * waypoint.radius_m;
+  const double along = std::max(across, 0.05 * std::fabs(waypoint.along_track_m));
+  return std::fabs(miss[kDl]) < along && std::fabs(miss[kDa]) < across &&
+         std::hypot(miss[kDex], miss[kDey]) < across && std::hypot(miss[kDix], miss[kDiy]) < across;
+}
+
+void Approach::begin_leg(const RelativeOrbit& now, const Matrix6& covariance) {
+  const Waypoint& waypoint = options_.plan.waypoints[waypoint_];
+  const double margin_m = uncertain_safe_m(now, covariance, options_.go_sigmas);
+  if (margin_m < options_.transfer.keep_out_m) return;
+  const std::int64_t end_ns = now.t_ns + revolutions_ns(now.chief, waypoint.leg_rev);
+  if (!plan_transfer(now, goal(now), end_ns, options_.transfer, &transfer_)) return;
+  phase_ = ApproachPhase::kLeg;
+  next_burn_ = 0;
+  ++legs_;
+}
+
+void Approach::end_leg(const RelativeOrbit& now) {
+  if (phase_ == ApproachPhase::kAborting) {
+    phase_ = ApproachPhase::kAborted;
+    return;
+  }
+  phase_ = ApproachPhase::kWaiting;
+  if (!reached(now)) return;
+  const Waypoint& waypoint = options_.plan.waypoints[waypoint_];
+  if (waypoint_ + 1 == options_.plan.count) {
+    phase_ = ApproachPhase::kArrived;
+    return;
+  }
+  ++waypoint_;
+  phase_ = ApproachPhase::kHolding;
+  hold_until_ns_ = now.t_ns + revolutions_ns(now.chief, waypoint.hold_rev);
+}
+
+bool Approach::decide(const RelativeOrbit& now, const Matrix6& covariance, double lead_s,
+                      Burn* burn) {
+  const bool flying = phase_ == ApproachPhase::kLeg || phase_ == ApproachPhase::kAborting;
+  if (flying && next_burn_ == transfer_.count && now.t_ns >= transfer_.end_ns) end_leg(now);
+  if (phase_ == ApproachPhase::kHolding && now.t_ns >= hold_until_ns_) {
+    phase_ = ApproachPhase::kWaiting;
+  }
+  // Arrived, it stays: J2 and errors move it off, and the last leg brings it back.
+  if (phase_ == ApproachPhase::kArrived && !reached(now)) phase_ = ApproachPhase::kWaiting;
+  if (phase_ == ApproachPhase::kWaiting && !held_) begin_leg(now, covariance);
+  if (phase_ != ApproachPhase::kLeg && phase_ != ApproachPhase::kAborting) return false;
+  if (next_burn_ == transfer_.count) return false;
+  const Burn& next = transfer_.burns[next_burn_];
+  if (next.t_ns - now.t_ns > nanoseconds(lead_s)) return false;
+  ++next_burn_;
+  // Too late to be commanded, it is a lost burn, and the plan is safe without it.
+  if (next.t_ns <= now.t_ns) return false;
+  *burn = next;
+  delta_v_mps_ += norm(next.dv_RTN);
+  return true;
+}
+
+bool Approach::abort(const RelativeOrbit& now) {
+  if (!plan_abort(now, options_.abort_radius_m, options_.abort_drift_m, options_.transfer.lead_s,
+                  &transfer_)) {
+    return false;
+  }
+  phase_ = ApproachPhase::kAborting;
+  next_burn_ = 0;
+  held_ = true;
+  return true;
+}
+
+void Approach::hold() {
+  held_ = true;
+  if (phase_ == ApproachPhase::kLeg) phase_ = ApproachPhase::kWaiting;
+}
+
+void Approach::resume(const RelativeOrbit& now) {
+  held_ = false;
+  phase_ = ApproachPhase::kWaiting;
+  waypoint_ = 0;
+  while (waypoint_ + 1 < options_.plan.count &&
+         std::fabs(options_.plan.waypoints[waypoint_].along_track_m) > std::fabs(now.a_roe[kDl])) {
+    ++waypoint_;
+  }
+}
+
+}  // namespace rpo_kit
