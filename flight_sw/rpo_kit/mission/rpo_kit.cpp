@@ -1,0 +1,245 @@
+#include "rpo_kit/mission/rpo_kit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+
+#include "rpo_kit/rpo_kit_messages.h"
+#include "support/orbit/constants.hpp"
+
+namespace rpo_kit {
+
+using namespace flight_support;
+
+namespace {
+
+using LinkRole = formation_keeping::Role;
+
+LinkRole link_role(Role role) {
+  return role == Role::kTarget ? LinkRole::kChief : LinkRole::kDeputy;
+}
+LinkRole peer(Role role) {
+  return role == Role::kTarget ? LinkRole::kDeputy : LinkRole::kChief;
+}
+
+}  // namespace
+
+RpoKit::RpoKit(Outputs& outputs, const Configuration& configuration, const Boot& boot)
+    : out_(outputs),
+      configuration_(configuration),
+      sender_(link_role(configuration.role), boot.boot_count),
+      receiver_(peer(configuration.role)),
+      navigation_(configuration.navigation),
+      approach_(configuration.approach) {
+  novatel_framer_init(&framer_, gnss_room_, sizeof gnss_room_);
+  out_.out_mode(boot.now_ns, static_cast<std::uint32_t>(mode()));
+  if (is_chaser()) {
+    out_.request_tick(boot.now_ns + nanoseconds(configuration_.decision_period_s));
+  }
+}
+
+bool RpoKit::in_gnss(std::int64_t now_ns, const unsigned char* bytes, std::uint32_t count) {
+  const std::uint32_t bad_before = framer_.bad_frames;
+  for (std::size_t left = count; left > 0;) {
+    const std::size_t taken = novatel_framer_write(&framer_, bytes, left);
+    bytes += taken;
+    left -= taken;
+    novatel_frame frame;
+    GnssFix fix;
+    while (novatel_framer_next(&framer_, &frame) != 0) {
+      if (!read_fix(frame, &fix)) continue;
+      const bool stale = repeats(last_fix_, fix);
+      last_fix_ = fix;
+      if (!stale) take_fix(now_ns, fix);
+    }
+  }
+  return framer_.bad_frames == bad_before || reject();
+}
+
+EciFix RpoKit::in_eci(const GnssFix& fix) const {
+  return {fix.epoch_ns,
+          eci_from_ecef(fix.epoch_ns, fix.r_ECEF, fix.v_ECEF, configuration_.earth_time),
+          fix.sigma_r_m, fix.sigma_v_mps};
+}
+
+// Periods are counted in GPS time, not from boot: so both spacecraft send the same epochs.
+void RpoKit::take_fix(std::int64_t, const GnssFix& fix) {
+  const std::int64_t slot = fix.epoch_ns / nanoseconds(configuration_.crosslink_period_s);
+  if (!is_chaser()) {
+    if (slot == last_crosslink_slot_) return;
+    last_crosslink_slot_ = slot;
+    unsigned char packet[formation_keeping::kCrosslinkBytes];
+    sender_.pack(fix, packet);
+    out_.out_crosslink(packet, sizeof packet);
+    return;
+  }
+  navigation_.own_fix(in_eci(fix));
+}
+
+bool RpoKit::in_crosslink(std::int64_t, const unsigned char* packet, std::uint32_t bytes) {
+  using Verdict = formation_keeping::CrosslinkReceiver::Verdict;
+  if (receiver_.receive(packet, bytes) != Verdict::kAccepted) return reject();
+  if (is_chaser()) navigation_.target_fix(in_eci(receiver_.fix()));
+  return true;
+}
+
+bool RpoKit::in_command(std::int64_t now_ns, const unsigned char* message, std::uint32_t bytes) {
+  unsigned order = 0;
+  if (!is_chaser() || rpo_kit_get_command(message, bytes, &order) == 0) return reject();
+  decide(now_ns, static_cast<Order>(order));
+  return true;
+}
+
+bool RpoKit::in_bearing(const Bearing& bearing) {
+  const double length = norm(bearing.direction_ECI);
+  if (!is_chaser() || !(std::fabs(length - 1.0) < 1e-6) || !(bearing.sigma_rad > 0.0)) {
+    return reject();
+  }
+  navigation_.bearing(bearing);
+  return true;
+}
+
+bool RpoKit::in_pose(const PlaceMeasurement& place) {
+  if (!is_chaser() || !is_finite(place.r_TO_ECI) || !is_finite(place.covariance)) return reject();
+  navigation_.pose(place);
+  return true;
+}
+
+void RpoKit::in_tick(std::int64_t now_ns) {
+  if (!is_chaser()) return;
+  decide(now_ns, Order::kNone);
+  out_.request_tick(now_ns + nanoseconds(configuration_.decision_period_s));
+}
+
+Situation RpoKit::situation(std::int64_t now_ns, const RelativeOrbit* now,
+                            const Matrix6& covariance) const {
+  Situation s;
+  s.t_ns = now_ns;
+  s.estimate = now != nullptr;
+  s.arrived = approach_.phase() == ApproachPhase::kArrived;
+  s.aborted = approach_.phase() == ApproachPhase::kAborted;
+  if (now == nullptr) return s;
+  const Matrix6 H = rtn_from_relative_elements(now->chief.u_rad, mean_motion_radps(now->chief.a_m));
+  const Vector<6> x = H * now->a_roe;
+  const Vec3 r = vec3(x[0], x[1], x[2]);
+  s.range_m = norm(r);
+  const Matrix6 P = H * covariance * transpose(H);
+  double variance = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) variance += r[i] * P(i, j) * r[j];
+  }
+  s.range_sigma_m = std::sqrt(variance) / std::max(s.range_m, 1e-3);
+  s.safe_m = uncertain_safe_m(*now, covariance, configuration_.approach.go_sigmas);
+  return s;
+}
+
+void RpoKit::decide(std::int64_t now_ns, Order order) {
+  navigation_.process(now_ns);
+  RelativeOrbit now;
+  Matrix6 covariance;
+  const bool known = navigation_.at(now_ns, &now, &covariance);
+  const Mode before = mode();
+  const Mode after = autonomy_.decide(situation(now_ns, known ? &now : nullptr, covariance), order);
+  if (after != before) {
+    change_mode(after, now);
+    out_.out_mode(now_ns, static_cast<std::uint32_t>(after));
+  }
+  if (known) {
+    guide(now, covariance);
+    send_estimate(now, covariance);
+  }
+  const std::int64_t slot = now_ns / nanoseconds(configuration_.telemetry_period_s);
+  if (slot == last_telemetry_slot_) return;
+  last_telemetry_slot_ = slot;
+  send_telemetry(now_ns, known ? &now : nullptr, covariance);
+}
+
+void RpoKit::change_mode(Mode mode, const RelativeOrbit& now) {
+  char line[96];
+  std::snprintf(line, sizeof line, "mode %u: %s", static_cast<unsigned>(mode), autonomy_.reason());
+  out_.log(LogLevel::kInfo, line);
+  if (mode == Mode::kApproaching) {
+    approach_.resume(now);
+  } else if (mode == Mode::kHolding || mode == Mode::kSafe) {
+    approach_.hold();
+  } else if (mode == Mode::kAborting && !approach_.abort(now)) {
+    out_.log(LogLevel::kError, "no way to abort");
+  }
+}
+
+void RpoKit::guide(const RelativeOrbit& now, const Matrix6& covariance) {
+  const bool moving =
+      mode() == Mode::kApproaching || mode() == Mode::kInspecting || mode() == Mode::kAborting;
+  if (!moving) return;
+  Burn burn;
+  while (approach_.decide(now, covariance, configuration_.burn_lead_s, &burn)) {
+    command_burn(now, burn);
+  }
+}
+
+// The burn is in the chaser's RTN at its instant.
+void RpoKit::command_burn(const RelativeOrbit& now, const Burn& burn) {
+  Observer own;
+  if (!navigation_.own_at(burn.t_ns, &own)) return;
+  const StateEci state = state_from_osculating(osculating_from_mean(own.mean));
+  const Vec3 dv_ECI = transpose(eci_to_rtn(state)) * burn.dv_RTN;
+  const double dv[3] = {dv_ECI[0], dv_ECI[1], dv_ECI[2]};
+  // What the thruster did not take will not happen, and must not be in the filter.
+  if (!out_.out_maneuver(burn.t_ns, dv)) {
+    out_.log(LogLevel::kError, "the thruster refused a burn");
+    return;
+  }
+  navigation_.burn(burn.t_ns, dv_ECI);
+  delta_v_mps_ += norm(burn.dv_RTN);
+  ++burns_;
+  char line[128];
+  std::snprintf(line, sizeof line, "burn %u in %.0f s: RTN %.2f %.2f %.2f mm/s, a*dl %.0f m",
+                burns_, seconds(burn.t_ns - now.t_ns), 1e3 * burn.dv_RTN[0], 1e3 * burn.dv_RTN[1],
+                1e3 * burn.dv_RTN[2], now.a_roe[kDl]);
+  out_.log(LogLevel::kInfo, line);
+}
+
+void RpoKit::send_estimate(const RelativeOrbit& now, const Matrix6& covariance) {
+  const StateEci target = state_from_osculating(osculating_from_mean(now.chief));
+  const OrbitElements chaser = apply_relative_elements(now.chief, now.a_roe);
+  const RelativeStateRtn relative =
+      relative_state_rtn(target, state_from_osculating(osculating_from_mean(chaser)));
+  const Matrix6 H = rtn_from_relative_elements(now.chief.u_rad, mean_motion_radps(now.chief.a_m));
+  const Matrix6 P = H * covariance * transpose(H);
+  RelativeOutput e;
+  e.t_ns = now.t_ns;
+  for (int k = 0; k < 3; ++k) {
+    e.r_DC_RTN[k] = relative.r_DC_RTN[k];
+    e.v_DC_RTN[k] = relative.v_DC_RTN[k];
+    e.sigma_r_m[k] = std::sqrt(P(k, k));
+    e.sigma_v_mps[k] = std::sqrt(P(k + 3, k + 3));
+  }
+  out_.out_estimate(e);
+}
+
+void RpoKit::send_telemetry(std::int64_t now_ns, const RelativeOrbit* now,
+                            const Matrix6& covariance) {
+  rpo_kit_telemetry t;
+  std::memset(&t, 0, sizeof t);
+  t.t_ns = now_ns;
+  t.mode = static_cast<std::uint32_t>(mode());
+  t.waypoint = static_cast<std::uint32_t>(approach_.waypoint());
+  for (int k = 0; k < 6 && now != nullptr; ++k) {
+    t.a_roe_m[k] = now->a_roe[k];
+    t.sigma_m[k] = std::sqrt(covariance(k, k));
+  }
+  t.delta_v_mps = delta_v_mps_;
+  t.burns = burns_;
+  for (int k = 0; k < kSources; ++k) {
+    t.used[k] = static_cast<std::uint32_t>(navigation_.used(static_cast<Source>(k)));
+  }
+  t.outliers = static_cast<std::uint32_t>(navigation_.outliers());
+  t.restarts = static_cast<std::uint32_t>(navigation_.restarts());
+  t.rejected = rejected_;
+  unsigned char packet[RPO_KIT_TELEMETRY_BYTES];
+  rpo_kit_put_telemetry(packet, &t);
+  out_.out_telemetry(packet, sizeof packet);
+}
+
+}  // namespace rpo_kit

@@ -1,0 +1,99 @@
+/* Byte layouts of the package's own messages, for ground software and tests. C89, little-endian, no
+ * struct overlay, in the manner of orrery_messages.h. Times are GPS ns since 1980-01-06.
+ *
+ *   command, ground -> chaser      0 u8 order (RPO_KIT_GO, _HOLD, _ABORT) | 1 u32 crc
+ *   keypoints, a processor of images -> chaser
+ *     0 i64 exposure_ns, of its middle | 8 u32 count, at most 32
+ *     | 12 per keypoint: u32 point, f64 u px, f64 v px, f64 sigma px
+ *   telemetry, chaser -> ground
+ *     0 i64 t_ns | 8 u32 mode | 12 u32 waypoint | 16 f64 a_roe_m[6] | 64 f64 sigma_m[6]
+ *     | 112 f64 delta_v_mps | 120 u32 burns | 124 u32 used[3]: GNSS, directions, poses
+ *     | 136 u32 outliers | 140 u32 restarts | 144 u32 rejected
+ *     a_roe of the chaser relative to the target, mean, order da, dl, dex, dey, dix, diy; zero
+ *     while there is no estimate.
+ *
+ * crc is the common CRC-32 (zlib) of the bytes before it. Modes: rpo_kit/mission/autonomy.hpp.
+ */
+#ifndef RPO_KIT_MESSAGES_H
+#define RPO_KIT_MESSAGES_H
+
+#include "orrery_crc32.h"
+#include "orrery_messages.h"
+
+#define RPO_KIT_COMMAND_BYTES 5u
+#define RPO_KIT_TELEMETRY_BYTES 148u
+#define RPO_KIT_KEYPOINT_BYTES 28u
+#define RPO_KIT_MOST_KEYPOINTS 32u
+#define RPO_KIT_KEYPOINTS_BYTES (12u + RPO_KIT_MOST_KEYPOINTS * RPO_KIT_KEYPOINT_BYTES)
+
+enum { RPO_KIT_GO = 1, RPO_KIT_HOLD = 2, RPO_KIT_ABORT = 3 };
+
+enum {
+  RPO_KIT_MODE_STANDBY = 0,
+  RPO_KIT_MODE_ACQUIRING = 1,
+  RPO_KIT_MODE_APPROACHING = 2,
+  RPO_KIT_MODE_INSPECTING = 3,
+  RPO_KIT_MODE_HOLDING = 4,
+  RPO_KIT_MODE_ABORTING = 5,
+  RPO_KIT_MODE_SAFE = 6
+};
+
+typedef struct rpo_kit_telemetry {
+  int64_t t_ns;
+  uint32_t mode, waypoint;
+  double a_roe_m[6], sigma_m[6];
+  double delta_v_mps; /* commanded since boot */
+  uint32_t burns, used[3], outliers, restarts, rejected;
+} rpo_kit_telemetry;
+
+ORRERY_MAYBE_UNUSED static void rpo_kit_put_command(unsigned char* message, unsigned order) {
+  message[0] = (unsigned char)(order & 0xFFu);
+  orrery_put_u32(message + 1, orrery_crc32(message, 1));
+}
+
+/* 1 if the length, the CRC and the order are right; otherwise 0, and nothing is written. */
+ORRERY_MAYBE_UNUSED static int rpo_kit_get_command(const unsigned char* message, uint32_t bytes,
+                                                   unsigned* order) {
+  if (bytes != RPO_KIT_COMMAND_BYTES) return 0;
+  if (orrery_get_u32(message + 1) != orrery_crc32(message, 1)) return 0;
+  if (message[0] < RPO_KIT_GO || message[0] > RPO_KIT_ABORT) return 0;
+  *order = message[0];
+  return 1;
+}
+
+ORRERY_MAYBE_UNUSED static void rpo_kit_put_telemetry(unsigned char* message,
+                                                      const rpo_kit_telemetry* t) {
+  int i;
+  orrery_put_i64(message, t->t_ns);
+  orrery_put_u32(message + 8, t->mode);
+  orrery_put_u32(message + 12, t->waypoint);
+  orrery_put_f64s(message + 16, t->a_roe_m, 6);
+  orrery_put_f64s(message + 64, t->sigma_m, 6);
+  orrery_put_f64(message + 112, t->delta_v_mps);
+  orrery_put_u32(message + 120, t->burns);
+  for (i = 0; i < 3; i++) orrery_put_u32(message + 124 + 4 * i, t->used[i]);
+  orrery_put_u32(message + 136, t->outliers);
+  orrery_put_u32(message + 140, t->restarts);
+  orrery_put_u32(message + 144, t->rejected);
+}
+
+/* 1 if the length is right; otherwise 0, and nothing is written. */
+ORRERY_MAYBE_UNUSED static int rpo_kit_get_telemetry(const unsigned char* message, uint32_t bytes,
+                                                     rpo_kit_telemetry* t) {
+  int i;
+  if (bytes != RPO_KIT_TELEMETRY_BYTES) return 0;
+  t->t_ns = orrery_get_i64(message);
+  t->mode = orrery_get_u32(message + 8);
+  t->waypoint = orrery_get_u32(message + 12);
+  orrery_get_f64s(message + 16, t->a_roe_m, 6);
+  orrery_get_f64s(message + 64, t->sigma_m, 6);
+  t->delta_v_mps = orrery_get_f64(message + 112);
+  t->burns = orrery_get_u32(message + 120);
+  for (i = 0; i < 3; i++) t->used[i] = orrery_get_u32(message + 124 + 4 * i);
+  t->outliers = orrery_get_u32(message + 136);
+  t->restarts = orrery_get_u32(message + 140);
+  t->rejected = orrery_get_u32(message + 144);
+  return 1;
+}
+
+#endif
