@@ -36,85 +36,124 @@ function(orrery_cross_build name)
 endfunction()
 
 function(orrery_cross_library name processor)
-  set(sources "")
-  set(generated "")
-  set(includes "$<TARGET_PROPERTY:${name},INCLUDE_DIRECTORIES>")
+  set(objects "")
+  set(first "")   # made before any object: generated headers
   get_target_property(links ${name} LINK_LIBRARIES)
   foreach(target IN ITEMS ${name} LISTS links)
     if(NOT TARGET ${target})
       continue()
     endif()
     get_target_property(type ${target} TYPE)
-    get_target_property(folder ${target} SOURCE_DIR)
     if(NOT target STREQUAL name AND NOT type STREQUAL "STATIC_LIBRARY")
       continue()
     endif()
-    # What a static library generates for itself, such as tables.
-    if(NOT target STREQUAL name)
-      list(APPEND includes "$<TARGET_PROPERTY:${target},INCLUDE_DIRECTORIES>")
-      get_target_property(first ${target} MANUALLY_ADDED_DEPENDENCIES)
-      if(first)
-        list(APPEND generated ${first})
-      endif()
+    get_target_property(dependencies ${target} MANUALLY_ADDED_DEPENDENCIES)
+    if(dependencies AND NOT target STREQUAL name)
+      list(APPEND first ${dependencies})
     endif()
-    get_target_property(files ${target} SOURCES)
-    foreach(file IN LISTS files)
-      cmake_path(ABSOLUTE_PATH file BASE_DIRECTORY ${folder})
-      if(file MATCHES "\\.(c|cc|cpp|cxx)$")
-        list(APPEND sources ${file})
-      endif()
-    endforeach()
+    get_property(maker GLOBAL PROPERTY ORRERY_CROSS_MAKER_${target}.${processor})
+    if(maker)
+      list(APPEND first ${maker})
+    endif()
+    orrery_cross_objects(${name} ${processor} ${target})
   endforeach()
   set(output ${CMAKE_CURRENT_BINARY_DIR}/lib${name}.${processor}.so)
-  set(objects "")
-  foreach(source IN LISTS sources)
-    cmake_path(GET source FILENAME file)
-    string(SHA1 place ${source})
-    string(SUBSTRING ${place} 0 8 place)
-    set(object ${CMAKE_CURRENT_BINARY_DIR}/CMakeFiles/${name}.${processor}/${place}_${file}.o)
-    if(source MATCHES "\\.c$")
-      set(compiler ${ORRERY_CROSS_CC_${processor}})
-    else()
-      # Notes that GCC 7 passes some classes otherwise than GCC 6 did: all of it is compiled here.
-      set(compiler ${ORRERY_CROSS_CXX_${processor}} -std=c++17 -Wno-psabi)
-    endif()
-    add_custom_command(OUTPUT ${object}
-      COMMAND ${CMAKE_COMMAND} -E make_directory ${CMAKE_CURRENT_BINARY_DIR}/CMakeFiles/${name}.${processor}
-      COMMAND ${compiler} -O2 -g -fPIC -fvisibility=hidden ${ORRERY_NUMERIC_FLAG_LIST}
-        "-I$<JOIN:${includes},;-I>" -DORRERY_FLIGHT_BUILD
-        -MMD -MF ${object}.d -c ${source} -o ${object}
-      DEPENDS ${source} ${generated} DEPFILE ${object}.d
-      COMMAND_EXPAND_LISTS VERBATIM
-      COMMENT "Building ${processor} object of ${name}: ${file}")
-    list(APPEND objects ${object})
-  endforeach()
   add_custom_command(OUTPUT ${output}
     COMMAND ${ORRERY_CROSS_CXX_${processor}} -shared -Wl,--no-undefined ${objects} -o ${output} -lm
     DEPENDS ${objects} VERBATIM COMMENT "Linking ${processor} flight library ${name}")
   add_custom_target(${name}.${processor} DEPENDS ${output})
+  if(first)
+    add_dependencies(${name}.${processor} ${first})
+  endif()
   add_dependencies(${name} ${name}.${processor} orrery-flight-target.${processor})
+  set(beside ${PROJECT_BINARY_DIR}/orrery_cross)
   set_property(TARGET ${name} APPEND PROPERTY ORRERY_CROSS_FILES "${name}@${processor}=${output}"
-    "orrery-flight-target@${processor}=${PROJECT_BINARY_DIR}/orrery_cross/orrery-flight-target.${processor}")
+    "orrery-flight-target@${processor}=${beside}/orrery-flight-target.${processor}"
+    "orrery-instruction-count@${processor}=${beside}/orrery-instruction-count.so")
 endfunction()
 
-# Once per processor. The sources lie beside this file where Orrery is installed.
+# Appends to `objects` those of the sources of `target`, seen with its own include folders. A static
+# library that several flight libraries link is compiled once.
+function(orrery_cross_objects name processor target)
+  get_property(compiled GLOBAL PROPERTY ORRERY_CROSS_OBJECTS_${target}.${processor})
+  if(compiled)
+    set(objects ${objects} ${compiled} PARENT_SCOPE)
+    return()
+  endif()
+  set(compiled "")
+  set(includes "$<TARGET_PROPERTY:${target},INCLUDE_DIRECTORIES>")
+  set(place ${CMAKE_CURRENT_BINARY_DIR}/CMakeFiles/${name}.${processor})
+  get_target_property(folder ${target} SOURCE_DIR)
+  get_target_property(sources ${target} SOURCES)
+  foreach(source IN LISTS sources)
+    cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY ${folder})
+    if(NOT source MATCHES "\\.(c|cc|cpp|cxx)$")
+      continue()
+    endif()
+    cmake_path(GET source FILENAME file)
+    string(SHA1 hash ${source})
+    string(SUBSTRING ${hash} 0 8 hash)
+    set(object ${place}/${hash}_${file}.o)
+    set(compiler ${ORRERY_CROSS_CC_${processor}})
+    if(NOT source MATCHES "\\.c$")
+      # Notes that GCC 7 passes some classes otherwise than GCC 6 did: all of it is compiled here.
+      set(compiler ${ORRERY_CROSS_CXX_${processor}} -std=c++17 -Wno-psabi)
+    endif()
+    add_custom_command(OUTPUT ${object}
+      COMMAND ${CMAKE_COMMAND} -E make_directory ${place}
+      COMMAND ${compiler} -O2 -g -fPIC -fvisibility=hidden ${ORRERY_NUMERIC_FLAG_LIST}
+        "-I$<JOIN:${includes},;-I>" -DORRERY_FLIGHT_BUILD
+        -MMD -MF ${object}.d -c ${source} -o ${object}
+      DEPENDS ${source} DEPFILE ${object}.d
+      COMMAND_EXPAND_LISTS VERBATIM
+      COMMENT "Building ${processor} object of ${name}: ${file}")
+    list(APPEND compiled ${object})
+  endforeach()
+  set_property(GLOBAL PROPERTY ORRERY_CROSS_OBJECTS_${target}.${processor} ${compiled})
+  set_property(GLOBAL PROPERTY ORRERY_CROSS_MAKER_${target}.${processor} ${name}.${processor})
+  set(objects ${objects} ${compiled} PARENT_SCOPE)
+endfunction()
+
+# Once per processor: orrery-flight-target with its simulated heap. Once: the plugin that counts
+# instructions. The sources lie beside this file where Orrery is installed.
 function(orrery_cross_target_program processor)
   if(TARGET orrery-flight-target.${processor})
     return()
   endif()
-  set(host ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/target)
-  set(abi "$<TARGET_PROPERTY:orrery::flight_abi,INTERFACE_INCLUDE_DIRECTORIES>")
-  set(sources ${host}/orrery_flight_target.c ${host}/orrery_wire.c)
-  if(NOT EXISTS ${host})
-    set(host ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/../../flight_sw)
-    set(sources ${host}/host/orrery_flight_target.c ${host}/abi/orrery_wire.c)
+  set(c ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/target)
+  set(heap ${c}/orrery/harness/heap)
+  set(plugin ${c}/instruction_count.c)
+  set(serve ${c}/orrery_flight_target.c ${c}/orrery_wire.c)
+  if(NOT EXISTS ${c})
+    cmake_path(SET root NORMALIZE ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/../..)
+    set(heap ${root}/harness/heap)
+    set(plugin ${root}/harness/remote/instruction_count.c)
+    set(serve ${root}/flight_sw/host/orrery_flight_target.c ${root}/flight_sw/abi/orrery_wire.c)
   endif()
-  set(output ${PROJECT_BINARY_DIR}/orrery_cross/orrery-flight-target.${processor})
+  set(sources "")
+  foreach(part IN ITEMS target_heap block_heap first_fit_heap recency_list)
+    list(APPEND sources ${heap}/${part}.cpp)
+  endforeach()
+  set(place ${PROJECT_BINARY_DIR}/orrery_cross)
+  set(output ${place}/orrery-flight-target.${processor})
+  set(abi "$<TARGET_PROPERTY:orrery::flight_abi,INTERFACE_INCLUDE_DIRECTORIES>")
+  set(kernel "$<TARGET_PROPERTY:orrery::kernel,INTERFACE_INCLUDE_DIRECTORIES>")
   add_custom_command(OUTPUT ${output}
-    COMMAND ${CMAKE_COMMAND} -E make_directory ${PROJECT_BINARY_DIR}/orrery_cross
-    COMMAND ${ORRERY_CROSS_CC_${processor}} -std=c99 -O2 -g "-I$<JOIN:${abi},;-I>" ${sources}
-      -o ${output} -ldl
-    DEPENDS ${sources} COMMAND_EXPAND_LISTS VERBATIM
+    COMMAND ${CMAKE_COMMAND} -E make_directory ${place}
+    COMMAND ${ORRERY_CROSS_CC_${processor}} -std=c99 -O2 -g "-I$<JOIN:${abi},;-I>" -r ${serve} -o ${output}.o
+    # The C library's malloc is replaced: the compiler must not know what malloc does.
+    COMMAND ${ORRERY_CROSS_CXX_${processor}} -std=c++20 -O2 -g -fno-builtin -Wno-narrowing
+      "-I$<JOIN:${abi},;-I>" "-I$<JOIN:${kernel},;-I>" -I${c} ${sources} ${output}.o -o ${output} -ldl
+    DEPENDS ${serve} ${sources} COMMAND_EXPAND_LISTS VERBATIM
     COMMENT "Building orrery-flight-target for ${processor}")
   add_custom_target(orrery-flight-target.${processor} DEPENDS ${output})
+  if(NOT TARGET orrery-instruction-count)
+    add_custom_command(OUTPUT ${place}/orrery-instruction-count.so
+      COMMAND ${CMAKE_COMMAND} -E make_directory ${place}
+      COMMAND ${CMAKE_C_COMPILER} -std=c11 -Wall -Wextra -Werror -O2 -fPIC -shared -fvisibility=hidden
+        ${plugin} -o ${place}/orrery-instruction-count.so
+      DEPENDS ${plugin} VERBATIM COMMENT "Building the plugin that counts instructions")
+    add_custom_target(orrery-instruction-count DEPENDS ${place}/orrery-instruction-count.so)
+  endif()
+  add_dependencies(orrery-flight-target.${processor} orrery-instruction-count)
 endfunction()

@@ -41,4 +41,10 @@ install(FILES   # built by users for other processors
   ${PROJECT_SOURCE_DIR}/flight_sw/abi/orrery_wire.c
   ${PROJECT_SOURCE_DIR}/flight_sw/host/orrery_flight_library.h
   ${PROJECT_SOURCE_DIR}/flight_sw/host/orrery_flight_target.c
+  ${PROJECT_SOURCE_DIR}/harness/remote/instruction_count.c
   DESTINATION ${orrery_package_dir}/target)
+foreach(file IN ITEMS target_heap.cpp block_heap.cpp first_fit_heap.cpp recency_list.cpp
+    first_fit_heap.hpp recency_list.hpp tagged_heap.hpp page_array.hpp)
+  install(FILES ${PROJECT_SOURCE_DIR}/harness/heap/${file}
+    DESTINATION ${orrery_package_dir}/target/orrery/harness/heap)
+endforeach()

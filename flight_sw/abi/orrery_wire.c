@@ -315,6 +315,8 @@ static void done(wire_state* s, int32_t status, const orrery_wire_cost* cost) {
   put_u64(payload + 12, cost->heap_now);
   put_u64(payload + 20, cost->heap_peak);
   orrery_put_u32(payload + 28, s->asked_for_tick ? 1u : 0u);
+  put_u64(payload + 32, cost->heap_size);
+  put_u64(payload + 40, cost->heap_largest_free);
   put_header(s, ORRERY_W_DONE, sizeof payload, s->pending_tick, status);
   put(s, payload, sizeof payload);
   put_crc(s, orrery_crc32(payload, sizeof payload));

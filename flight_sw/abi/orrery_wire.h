@@ -17,7 +17,7 @@
 
 #define ORRERY_WIRE_MAGIC 0x5952524Fu /* "ORRY" */
 #define ORRERY_WIRE_HEADER_BYTES 32u
-#define ORRERY_WIRE_DONE_BYTES 32u
+#define ORRERY_WIRE_DONE_BYTES 48u
 /* No payload is larger, whatever the other side says. */
 #define ORRERY_WIRE_MOST_BYTES 0x4000000u
 
@@ -39,7 +39,8 @@ enum {
   ORRERY_W_NV_STORE = 19,        /* 0                slot         bytes                              */
   ORRERY_W_DONE = 20             /* pending tick,    status       u32 unit of cost | u64 cost
                                     or -1                         | u64 heap now | u64 heap peak
-                                                                  | u32 0 or 1: the call asked for a tick */
+                                                                  | u32 0 or 1: the call asked for a tick
+                                                                  | u64 heap size | u64 its largest free */
 };
 /* A text is u16 bytes, then the bytes. The fields of CREATE are u16 tag, u32 bytes, the bytes. */
 enum {
@@ -59,9 +60,11 @@ extern "C" {
 #endif
 
 typedef struct orrery_wire_cost {
-  uint32_t unit;                /* ORRERY_WU_ */
-  uint64_t cost;                /* of the call */
-  uint64_t heap_now, heap_peak; /* bytes; 0: not measured */
+  uint32_t unit; /* ORRERY_WU_ */
+  uint64_t cost; /* of the call */
+  /* Bytes, 0 where not measured: live now, most live within the call, the heap's size, and the
+   * largest block of it that is free. */
+  uint64_t heap_now, heap_peak, heap_size, heap_largest_free;
 } orrery_wire_cost;
 
 typedef struct orrery_wire_link { /* what a board supplies */

@@ -10,6 +10,7 @@
 #include <netinet/tcp.h>
 #include <signal.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <sys/wait.h>
@@ -25,11 +26,21 @@ static const char kUsage[] =
     "Serves the flight library to a simulation (--orrery_target=SPACECRAFT=...).\n"
     "HOW  --stdio                  standard input and output; the default\n"
     "     --unix PATH              listens on a Unix socket\n"
-    "     --tcp [ADDRESS:]PORT     listens; ADDRESS is 127.0.0.1 unless given, PORT 0 takes a free "
-    "one\n"
+    "     --tcp [ADDRESS:]PORT     listens; on 127.0.0.1 unless given; PORT 0 takes a free one\n"
     "     --serial DEVICE:BAUD     a serial line, raw, 8N1\n"
-    "--once ends after the first client. The port that it listens on is printed to standard "
-    "error.\n";
+    "--once                        ends after the first client\n"
+    "--heap BYTES                  a simulated heap for flight code, where it is linked\n"
+    "--instructions PAGE           cost as counted by harness/remote/instruction_count.c\n"
+    "The port that it listens on is printed to standard error.\n";
+
+/* harness/heap/target_heap.cpp, where it is linked. */
+__attribute__((weak)) void orrery_target_heap_open(uint32_t bytes);
+__attribute__((weak)) void orrery_target_heap_enter(void);
+__attribute__((weak)) void orrery_target_heap_leave(orrery_wire_cost* cost);
+
+/* Of the counting plugin: instructions between the last two marks. Null: host time is the cost. */
+static const volatile uint64_t* instructions;
+static uint64_t instructions_of_marks;
 
 typedef struct connection {
   int in, out;
@@ -62,19 +73,42 @@ static int32_t write_all(void* context, const void* data, uint32_t bytes) {
   return 0;
 }
 
-static void call_begins(void* context) {
-  connection* c = context;
-  clock_gettime(CLOCK_MONOTONIC, &c->begin);
+/* A system call that does nothing, where the plugin looks at its counter. */
+static void mark(size_t which) {
+  static const char kNothing[2];
+  const int error = errno;
+  if (write(-20306, kNothing, which) >= 0) abort();
+  errno = error;
 }
 
-/* Host time, for reports: what a call costs the mission is modelled by the simulation. */
+static void count_instructions(const char* page) {
+  const void* mapped = mmap(NULL, 16, PROT_READ, MAP_SHARED, atoi(page), 0);
+  if (mapped == MAP_FAILED) fail("nobody counts instructions at descriptor", page);
+  instructions = mapped;
+  mark(1), mark(2); /* write() is resolved now */
+  mark(1), mark(2);
+  instructions_of_marks = *instructions;
+}
+
+static void call_begins(void* context) {
+  connection* c = context;
+  if (orrery_target_heap_enter != NULL) orrery_target_heap_enter();
+  clock_gettime(CLOCK_MONOTONIC, &c->begin);
+  if (instructions != NULL) mark(1);
+}
+
+/* Host time is for reports alone; instructions repeat, so simulated time may depend on them. */
 static void call_ended(void* context, orrery_wire_cost* cost) {
   const connection* c = context;
   struct timespec now;
+  if (instructions != NULL) mark(2);
   clock_gettime(CLOCK_MONOTONIC, &now);
-  cost->unit = ORRERY_WU_NS;
-  cost->cost = (uint64_t)((int64_t)(now.tv_sec - c->begin.tv_sec) * 1000000000 +
-                          (now.tv_nsec - c->begin.tv_nsec));
+  cost->unit = instructions != NULL ? ORRERY_WU_INSTRUCTIONS : ORRERY_WU_NS;
+  cost->cost = instructions != NULL
+                   ? *instructions - instructions_of_marks
+                   : (uint64_t)((int64_t)(now.tv_sec - c->begin.tv_sec) * 1000000000 +
+                                (now.tv_nsec - c->begin.tv_nsec));
+  if (orrery_target_heap_leave != NULL) orrery_target_heap_leave(cost);
 }
 
 static int serve(const char* path, int in, int out) {
@@ -117,10 +151,30 @@ static speed_t speed_of(const char* baud) {
   return B0;
 }
 
-static int serve_serial(const char* path, char* device) {
+/* Its library starts as it was linked, and a crash ends that process alone. */
+static int serve_in_child(const char* path, int fd, int listener) {
+  int status = 0;
+  const pid_t child = fork();
+  if (child < 0) fail("fork", strerror(errno));
+  if (child == 0) {
+    if (listener >= 0) close(listener);
+    exit(serve(path, fd, fd));
+  }
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) continue;
+  if (WIFSIGNALED(status)) {
+    fprintf(stderr, "orrery-flight-target: flight code ended by signal %d (%s)\n", WTERMSIG(status),
+            strsignal(WTERMSIG(status)));
+  }
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
+}
+
+/* Nobody connects to a line: who is there sends ENQ, and more of them, which are dropped. */
+static int serve_serial(const char* path, char* device, int once) {
+  const struct timespec pause = {0, 200000000};
   struct termios line;
   char* baud = strrchr(device, ':');
-  int fd;
+  unsigned char heard;
+  int fd, status;
   if (baud == NULL) fail("--serial takes DEVICE:BAUD, not", device);
   *baud++ = '\0';
   fd = open(device, O_RDWR | O_NOCTTY);
@@ -129,10 +183,19 @@ static int serve_serial(const char* path, char* device) {
   line.c_cflag |= CLOCAL | CREAD;
   line.c_cc[VMIN] = 1;
   line.c_cc[VTIME] = 0;
-  if (cfsetspeed(&line, speed_of(baud)) != 0 || tcsetattr(fd, TCSAFLUSH, &line) != 0) {
+  if (cfsetspeed(&line, speed_of(baud)) != 0 || tcsetattr(fd, TCSANOW, &line) != 0) {
     fail(device, strerror(errno));
   }
-  return serve(path, fd, fd);
+  do {
+    connection c = {.in = fd};
+    for (heard = 0; heard != 5;) {
+      if (read_all(&c, &heard, 1) < 0) fail(device, "cannot be read");
+    }
+    nanosleep(&pause, NULL);
+    tcflush(fd, TCIFLUSH);
+    status = serve_in_child(path, fd, -1);
+  } while (!once);
+  return status;
 }
 
 static int listen_unix(const char* path) {
@@ -172,31 +235,18 @@ static int listen_tcp(char* where) {
   return fd;
 }
 
-/* A process per client: its library starts as it was linked, and a crash ends that process alone.
- */
 static int serve_listener(const char* path, int listener, int once) {
   int status = 0;
   do {
     const int yes = 1, fd = accept4(listener, NULL, NULL, SOCK_CLOEXEC);
-    pid_t child;
     if (fd < 0 && errno == EINTR) continue;
     if (fd < 0) fail("accept", strerror(errno));
-    setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &yes,
-               sizeof yes); /* fails on a Unix socket: no matter */
-    child = fork();
-    if (child < 0) fail("fork", strerror(errno));
-    if (child == 0) {
-      close(listener);
-      exit(serve(path, fd, fd));
-    }
+    /* Fails on a Unix socket: no matter. */
+    setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
+    status = serve_in_child(path, fd, listener);
     close(fd);
-    while (waitpid(child, &status, 0) < 0 && errno == EINTR) continue;
-    if (WIFSIGNALED(status)) {
-      fprintf(stderr, PROGRAM ": flight code ended by signal %d (%s)\n", WTERMSIG(status),
-              strsignal(WTERMSIG(status)));
-    }
   } while (!once);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
+  return status;
 }
 
 int main(int argc, char** argv) {
@@ -208,14 +258,19 @@ int main(int argc, char** argv) {
                             strcmp(argv[i], "--serial") == 0;
     if (strcmp(argv[i], "--once") == 0) {
       once = 1;
+    } else if (strcmp(argv[i], "--instructions") == 0 && i + 1 < argc) {
+      count_instructions(argv[++i]);
+    } else if (strcmp(argv[i], "--heap") == 0 && i + 1 < argc) {
+      if (orrery_target_heap_open == NULL) fail("no simulated heap is linked, so no", argv[i]);
+      orrery_target_heap_open((uint32_t)strtoul(argv[++i], NULL, 10));
     } else if (takes_where && i + 1 < argc) {
       how = argv[i];
       where = argv[++i];
     } else if (argv[i][0] != '-' && path == NULL) {
       path = argv[i];
     } else if (strcmp(argv[i], "--stdio") != 0) {
-      fputs(kUsage, stderr);
-      return 2;
+      path = NULL;
+      break;
     }
   }
   if (path == NULL) {
@@ -224,7 +279,7 @@ int main(int argc, char** argv) {
   }
   signal(SIGPIPE, SIG_IGN);
   if (where == NULL) return serve_stdio(path);
-  if (strcmp(how, "--serial") == 0) return serve_serial(path, where);
+  if (strcmp(how, "--serial") == 0) return serve_serial(path, where, once);
   return serve_listener(path, strcmp(how, "--unix") == 0 ? listen_unix(where) : listen_tcp(where),
                         once);
 }

@@ -101,13 +101,13 @@ const CrashReport& FlightProcess::crash() const {
 }
 
 std::uint64_t FlightProcess::work() const {
-  return impl_->work == nullptr ? 0 : impl_->work->count;
+  return impl_->work == nullptr ? impl_->target_instructions : impl_->work->count;
 }
 Duration FlightProcess::virtual_time_spent() const {
   return impl_->services.spent();
 }
 bool FlightProcess::counts_work() const {
-  return impl_->work != nullptr;
+  return impl_->work != nullptr || impl_->options.target.kind != TargetAddress::Kind::kHere;
 }
 
 const std::vector<std::string>& FlightProcess::edited_symbols() const {

@@ -130,10 +130,10 @@ class FlightProcess {
   HeapFigures heap() const;
   /// Most of its stack that it has used; 0 where it has none of its own.
   std::uint64_t stack_high_water_bytes() const;
-  std::uint64_t work() const;  // edges that the last call took, where the library counts them
+  std::uint64_t work() const;  // edges of the last call (COUNT_WORK), or instructions on a target
   /// What clock reads and sleeps of the last call took: it lengthens the execution time.
   Duration virtual_time_spent() const;
-  bool counts_work() const;  // the library was built with COUNT_WORK
+  bool counts_work() const;  // the library was built with COUNT_WORK, or runs on a target
   /// Below what the heap already has is allowed: it stops growing.
   /// @throws std::invalid_argument  above 4 GiB less 1 MiB.
   void set_heap_limit(std::uint64_t bytes);

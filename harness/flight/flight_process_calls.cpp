@@ -73,6 +73,7 @@ CallOutcome FlightProcess::Impl::call(CallArguments arguments, SimTime truth, By
                 contained_, [](void* self) { static_cast<Impl*>(self)->run_library_call(); }, this,
                 capture_);
   stopwatch.stop();
+  if (target != nullptr && returned) report_target_time();
   end_call(truth);
   if (options.calls != nullptr) record_call(data, returned);
   if (returned) return judge(arguments_, truth);

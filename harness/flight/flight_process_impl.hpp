@@ -84,7 +84,9 @@ class FlightProcess::Impl {
   internal::FileServices files;
   std::unique_ptr<FlightLibrary> library;          // unloaded while all of the above is still there
   std::unique_ptr<internal::FlightTarget> target;  // in place of the library
-  orrery_work* work = nullptr;                     // of the library; null: it counts none
+  std::uint64_t target_instructions = 0;           // of the last call there; 0: it counts none
+  HeapFigures target_heap;
+  orrery_work* work = nullptr;  // of the library; null: it counts none
 
   std::vector<internal::GlobalsWatch> globals;    // Isolation::kShared; the library's own first
   std::vector<std::string> watched_dependencies;  // names of the others
@@ -118,6 +120,7 @@ class FlightProcess::Impl {
   bool call_target();
   const TargetAnswer& ask_target();
   void take_answer(const TargetAnswer& answer);
+  void report_target_time();
   void find_work_counter();
   void fill_host_table();
   void begin_call();

@@ -48,7 +48,7 @@ std::vector<LeakReport> FlightProcess::Impl::leaks(std::uint64_t after, std::uin
 }
 
 HeapFigures FlightProcess::heap() const {
-  return impl_->heap == nullptr ? HeapFigures{} : impl_->heap->blocks().figures();
+  return impl_->heap == nullptr ? impl_->target_heap : impl_->heap->blocks().figures();
 }
 
 std::uint64_t FlightProcess::stack_high_water_bytes() const {

@@ -6,6 +6,7 @@
 #include <orrery/harness/flight/port_table.hpp>
 
 #include <algorithm>
+#include <orrery_wire.h>
 #include <stdexcept>
 
 namespace orrery {
@@ -13,18 +14,70 @@ namespace internal {
 
 namespace {
 
+constexpr Duration kDebuggerPatience = std::chrono::hours(24);
+
+bool times_by_work(const FlightProcessOptions& options) {
+  return options.execution_time.counts_work() ||
+         std::any_of(options.execution_time_of.begin(), options.execution_time_of.end(),
+                     [](const auto& entry) { return entry.second.counts_work(); });
+}
+
+// Of Debian's cross compilers, whose libraries lie in /usr/TRIPLET.
+std::string cross_triplet(const TargetAddress& emulator) {
+  const std::string processor = emulated_processor(emulator);
+  if (processor == "arm64") return "aarch64-linux-gnu";
+  return processor == "armhf" ? "arm-linux-gnueabihf" : "arm-linux-gnueabi";
+}
+
+// Found by the names that orrery_add_flight_library(... CROSS) gives them.
+std::string built_for(const FlightProcessOptions& options, const std::string& what) {
+  return find_flight_library(what + "@" + emulated_processor(options.target));
+}
+
+// qemu takes what is beside the program from its environment.
 TargetAddress where_it_runs(const FlightProcessOptions& options) {
+  constexpr std::uint64_t kMostHeap_bytes = 1'000'000'000;  // of 4 GiB of addresses
   if (options.target.kind != TargetAddress::Kind::kEmulator) return options.target;
-  const std::string processor = "@" + emulated_processor(options.target);
-  return emulator_command(options.target, find_flight_library("orrery-flight-target" + processor),
-                          find_flight_library(options.library + processor));
+  TargetAddress started =
+      emulator_command(options.target, built_for(options, "orrery-flight-target"),
+                       built_for(options, options.library));
+  std::string environment;
+  if (options.target.port != 0) {
+    environment += "env QEMU_GDB=" + std::to_string(options.target.port) + " ";
+  }
+  started.where += " --heap " + std::to_string(std::min(options.heap_bytes, kMostHeap_bytes));
+  if (times_by_work(options)) {
+    const std::string page = "199";  // a descriptor that nobody else takes
+    environment += "env QEMU_PLUGIN='" + built_for(options, "orrery-instruction-count") +
+                   ",page=" + page + "' ";
+    started.where += " --instructions " + page;
+  }
+  started.where = environment + started.where;
+  return started;
 }
 
 }  // namespace
 
-FlightTarget::FlightTarget(const FlightProcessOptions& options) {
+TargetDebugging target_debugging(const FlightProcessOptions& options) {
+  if (options.target.kind != TargetAddress::Kind::kEmulator) return {};
+  TargetAddress waiting = options.target;
+  if (waiting.port == 0) waiting.port = 4711;
+  const std::string library = built_for(options, options.library);
+  const auto step = [](const std::string& command) { return " -ex '" + command + "'"; };
+  return {"--orrery_target='" + process_name(options) + "=" + to_string(waiting) + "'",
+          "gdb-multiarch -q '" + built_for(options, "orrery-flight-target") + "'" +
+              step("set sysroot /usr/" + cross_triplet(waiting)) +
+              step("set solib-search-path " + library.substr(0, library.rfind('/'))) +
+              step("target remote :" + std::to_string(waiting.port)) + step("continue") +
+              step("backtrace")};
+}
+
+FlightTarget::FlightTarget(const FlightProcessOptions& options)
+    : wants_instructions_(times_by_work(options)) {
   try {
-    remote_.emplace(where_it_runs(options), options.target_patience);
+    const bool debugged =
+        options.target.kind == TargetAddress::Kind::kEmulator && options.target.port != 0;
+    remote_.emplace(where_it_runs(options), debugged ? kDebuggerPatience : options.target_patience);
   } catch (const TargetLost& lost) {
     throw std::invalid_argument("flight process " + process_name(options) + ": " + lost.what());
   }
@@ -45,6 +98,14 @@ FlightTarget::FlightTarget(const FlightProcessOptions& options) {
   };
   table_.tick = [](void*, std::int64_t) { return ORRERY_FATAL; };
   table_.destroy = [](void*) {};
+}
+
+void FlightTarget::check_cost(const TargetAnswer& answer) const {
+  if (wants_instructions_ && answer.cost_unit != ORRERY_WU_INSTRUCTIONS) {
+    throw TargetLost(
+        "counts no instructions, on which the execution time depends; an emulator does that "
+        "(qemu-arm), or orrery-flight-target --instructions");
+  }
 }
 
 }  // namespace internal
@@ -109,6 +170,14 @@ const TargetAnswer& FlightProcess::Impl::ask_target() {
                          to_string(options.target) + ", where no function of this program does");
 }
 
+// The link is no part of what a call took.
+void FlightProcess::Impl::report_target_time() {
+  const TargetAnswer& answer = target->remote().answer();
+  if (answer.cost_unit != ORRERY_WU_NS) return;
+  constexpr std::uint64_t kMost_ns = 1'000'000'000'000;  // whatever it says
+  stopwatch.replace_last(Duration(static_cast<std::int64_t>(std::min(answer.cost, kMost_ns))));
+}
+
 void FlightProcess::Impl::take_answer(const TargetAnswer& answer) {
   arguments_.status = answer.status;
   for (const TargetAnswer::Message& m : answer.outputs) {
@@ -128,8 +197,18 @@ void FlightProcess::Impl::take_answer(const TargetAnswer& answer) {
     memory->store(m.number, ByteBuffer(content.begin(), content.end()));
   }
   if (answer.asked_for_tick) tick_request = answer.pending_tick_ns;
+  target->check_cost(answer);
+  target_instructions = answer.cost_unit == ORRERY_WU_INSTRUCTIONS ? answer.cost : 0;
+  target_heap.limit_bytes = options.heap_bytes;
+  target_heap.resting_bytes = answer.heap_now_bytes;
+  target_heap.transient_peak_bytes = answer.heap_peak_bytes;
+  target_heap.high_water_bytes = std::max(target_heap.high_water_bytes, answer.heap_peak_bytes);
+  target_heap.heap_bytes = answer.heap_bytes;
+  target_heap.largest_free_bytes = answer.heap_largest_free_bytes;
   record.resting_bytes = answer.heap_now_bytes;
   record.transient_peak_bytes = answer.heap_peak_bytes;
+  record.heap_bytes = answer.heap_bytes;
+  record.largest_free_bytes = answer.heap_largest_free_bytes;
 }
 
 }  // namespace orrery

@@ -20,6 +20,16 @@ class HostStopwatch {
     last_ = ticks() - started_;
     sum_ += last_;
   }
+  /// In place of the span just measured: another processor told how long it took there.
+  void replace_last(Duration span) {
+    const std::chrono::duration<double, std::nano> elapsed =
+        std::chrono::steady_clock::now() - first_time_;
+    sum_ -= last_;
+    last_ = static_cast<std::uint64_t>(static_cast<double>(to_ns(span)) *
+                                       static_cast<double>(ticks() - first_ticks_) /
+                                       elapsed.count());
+    sum_ += last_;
+  }
   std::uint64_t last_ticks() const { return last_; }
   Duration total() const { return duration(sum_); }
   /// Of so many ticks of any stopwatch, by what this one has seen since it was made.

@@ -279,6 +279,8 @@ void RemoteFlight::finish(const Frame& frame) {
   answer_.cost = get_u64(p + 4);
   answer_.heap_now_bytes = get_u64(p + 12);
   answer_.heap_peak_bytes = get_u64(p + 20);
+  answer_.heap_bytes = get_u64(p + 32);
+  answer_.heap_largest_free_bytes = get_u64(p + 40);
   if (answer_.cost_unit > ORRERY_WU_INSTRUCTIONS) {
     breach("a cost in unit " + std::to_string(answer_.cost_unit) + "; units are 0 to 2");
   }

@@ -42,7 +42,9 @@ struct TargetAnswer {
 
   std::uint32_t cost_unit = 0;  // ORRERY_WU_: none, ns of the target's clock, instructions
   std::uint64_t cost = 0;
-  std::uint64_t heap_now_bytes = 0, heap_peak_bytes = 0;  // 0: not measured
+  // 0: not measured. Live now, most live within the call, the heap's size, its largest free block.
+  std::uint64_t heap_now_bytes = 0, heap_peak_bytes = 0, heap_bytes = 0,
+                heap_largest_free_bytes = 0;
 };
 
 /// Method     One request is open at a time; what comes before its DONE is kept and handed over
@@ -65,6 +67,8 @@ class RemoteFlight {
   RemoteFlight(int socket, std::string name, Duration patience);
 
   const TargetHello& hello() const { return hello_; }
+  /// Of the last call.
+  const TargetAnswer& answer() const { return answer_; }
 
   struct Boot {
     std::string_view spacecraft, process;

@@ -12,7 +12,7 @@ using Kind = TargetAddress::Kind;
   throw std::invalid_argument(
       "target \"" + std::string(text) + "\": " + why +
       "; it is exec:COMMAND, unix:PATH, tcp:HOST:PORT, serial:DEVICE:BAUD, qemu-arm, "
-      "qemu-arm1176 or qemu-aarch64");
+      "qemu-arm1176 or qemu-aarch64, the last three also with the :PORT of a debugger");
 }
 
 // What stands behind the last ':' of "where:number".
@@ -68,6 +68,10 @@ TargetAddress emulator_command(const TargetAddress& address, const std::string& 
 TargetAddress parse_target_address(std::string_view text) {
   for (const Emulator& emulator : kEmulators) {
     if (text == emulator.name) return {.kind = Kind::kEmulator, .where = emulator.name};
+    if (!text.starts_with(std::string(emulator.name) + ":")) continue;
+    TargetAddress address{.kind = Kind::kEmulator, .where = std::string(text)};
+    address.port = take_number(text, address.where, 65535);
+    return address;
   }
   for (const Kind kind : {Kind::kExec, Kind::kUnix, Kind::kTcp, Kind::kSerial}) {
     const std::string_view prefix = prefix_of(kind);

@@ -137,6 +137,12 @@ int open_serial(const TargetAddress& address) {
   if (cfsetspeed(&line, speed_of(address)) != 0 || tcsetattr(fd, TCSAFLUSH, &line) != 0) {
     cannot_reach(address, system_error(errno));
   }
+  // Nobody is told that somebody has come: a target waits for ENQ, and drops the others, which end
+  // what it still serves of before.
+  const std::string enquiries(64, '\5');
+  if (::write(fd, enquiries.data(), enquiries.size()) != static_cast<ssize_t>(enquiries.size())) {
+    cannot_reach(address, system_error(errno));
+  }
   return fd;
 }
 
