@@ -87,7 +87,8 @@ Report full_report() {
     c.add(i * 1s, converging(i));
     sigma.add(i * 1s, 3);
   }
-  for (const Duration t : {5h + 0s, 5h + 6min, 25h + 0s, 25h + 6min, 45h + 0s}) burns.add(t, 1);
+  for (const Duration t : std::initializer_list<Duration>{5h, 5h + 6min, 25h, 25h + 6min, 45h})
+    burns.add(t, 1);
   report.header = {{"seed", "1"}};
   report.host = {{"replay", "./test --gtest_filter='A.B' --orrery_seed=1 & more <of it>"}};
   report.table = {{"", "delta-v"}, {{"deputy", "0.3"}}};
