@@ -143,7 +143,7 @@ void BM_Navigation_IntegerResolution(benchmark::State& state) {
 }
 BENCHMARK(BM_Navigation_IntegerResolution);
 
-// The four together with twelve satellites: what issue and guide call one filter epoch.
+// The four together with twelve satellites: one filter epoch.
 void BM_Navigation_FilterEpoch(benchmark::State& state) {
   Instant at(90);
   formation_gnc::UpdateReport sdcp;

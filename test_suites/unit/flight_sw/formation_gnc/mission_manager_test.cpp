@@ -3,11 +3,12 @@
 #include <gtest/gtest.h>
 
 #include "link_model.hpp"
+#include "support/orbit/constants.hpp"
 
 namespace formation_gnc {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1000000000;
+using flight_support::kSecond_ns;
 constexpr std::int64_t kBoot_ns = 1000000 * kSecond_ns;
 
 formation_gnc_command upload(std::uint32_t number, Mode mode, std::int64_t t_ns) {

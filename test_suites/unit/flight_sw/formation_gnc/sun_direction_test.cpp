@@ -48,7 +48,7 @@ void every_ten_days_from_2016_to_2030(const Visit& visit) {
   for (int k = 0; k < 564; ++k) visit(kBegin_ns + k * (838079 * kSecond_ns + 123456789));
 }
 
-// The issue asks for 10" (2 mm at 40 m). Terms left out 0.2" (root of the sum of squares), so 1" is
+// Asked for is 10" (2 mm at 40 m). Terms left out 0.2" (root of the sum of squares), so 1" is
 // the most to expect of 564 places; frame bias 0.02", second order of aberration 0.001". Observed
 // 0.85".
 TEST(SunDirectionTest, GeocentricPlaceAgreesWithErfaFrom2016To2030) {

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "link_model.hpp"
+#include "support/orbit/constants.hpp"
 
 namespace formation_gnc {
 namespace {
@@ -17,7 +18,7 @@ using formation_gnc_test::LinkModel;
 using formation_gnc_test::LinkQuality;
 using formation_gnc_test::Packet;
 
-constexpr std::int64_t kSecond_ns = 1000000000;
+using flight_support::kSecond_ns;
 
 // One spacecraft's computer: the protocol on its link, a packet every 10 s, a record that survives.
 class Computer {
