@@ -1,7 +1,10 @@
 #include "formation_gnc/control/separation_monitor.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <initializer_list>
+#include <utility>
 
 #include "support/orbit/constants.hpp"
 
@@ -13,6 +16,8 @@ namespace {
 
 constexpr int kSamplesPerRevolution = 120;
 constexpr int kPhases = 72;
+constexpr int kDirections = 12;  // of escape that are tried where the cheapest leads too near
+constexpr double kHorizon_rev = 2.0;
 // What the escape aims at, over what it must reach: room for execution errors of 2 %, for a*da that
 // they leave, and for the drift of the vectors.
 constexpr double kEscapeMargin = 1.15;
@@ -67,19 +72,52 @@ double cost(const RelativeElements& from, const RelativeElements& to) {
          std::hypot(to[kDix] - from[kDix], to[kDiy] - from[kDiy]);
 }
 
-RelativeElements cheapest_target(const RelativeElements& now, double size_m) {
-  RelativeElements best;
-  double least = INFINITY;
+// The cheapest in each of as many sectors, the cheapest of all first.
+std::array<RelativeElements, kDirections> targets_by_cost(const RelativeElements& now,
+                                                          double size_m) {
+  std::array<std::pair<double, RelativeElements>, kDirections> best;
+  for (auto& one : best) one.first = INFINITY;
   for (int k = 0; k < kPhases; ++k) {
-    for (const double sign : {1.0, -1.0}) {
-      const RelativeElements target = escape_target(now, size_m, kTwoPi * k / kPhases, sign);
+    for (const int side : {0, 1}) {
+      const RelativeElements target =
+          escape_target(now, size_m, kTwoPi * k / kPhases, side == 0 ? 1.0 : -1.0);
       const double price = cost(now, target);
-      if (price >= least) continue;
-      least = price;
-      best = target;
+      auto& sector =
+          best[static_cast<std::size_t>(k * kDirections / (2 * kPhases) + side * kDirections / 2)];
+      if (price < sector.first) sector = {price, target};
     }
   }
-  return best;
+  std::stable_sort(best.begin(), best.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::array<RelativeElements, kDirections> targets;
+  for (std::size_t k = 0; k < targets.size(); ++k) targets[k] = best[k].second;
+  return targets;
+}
+
+// The least distance, along-track included, while burns are flown and coasted after.
+double closest_approach_m(const RelativeOrbit& now, const std::vector<Burn>& burns) {
+  const double n = mean_motion_radps(now.chief.a_m);
+  RelativeElements a_roe = now.a_roe;
+  std::int64_t t_ns = now.t_ns;
+  const auto coast_to = [&](std::int64_t until_ns) {
+    const OrbitElements chief = propagate_mean(now.chief, seconds(t_ns - now.t_ns));
+    a_roe = state_transition(chief, seconds(until_ns - t_ns)) * a_roe;
+    t_ns = until_ns;
+    return propagate_mean(now.chief, seconds(until_ns - now.t_ns));
+  };
+  double least_m = INFINITY;
+  std::size_t next = 0;
+  for (int k = 0; k <= kHorizon_rev * kSamplesPerRevolution; ++k) {
+    const std::int64_t sample_ns = now.t_ns + nanoseconds(kTwoPi * k / (kSamplesPerRevolution * n));
+    for (; next < burns.size() && burns[next].t_ns <= sample_ns; ++next) {
+      const OrbitElements chief = coast_to(burns[next].t_ns);
+      a_roe = a_roe + control_input(chief) * burns[next].dv_RTN;
+    }
+    const OrbitElements chief = coast_to(sample_ns);
+    const Vector<6> x = rtn_from_relative_elements(chief.u_rad, n) * a_roe;
+    least_m = std::fmin(least_m, std::hypot(x[0], x[1], x[2]));
+  }
+  return least_m;
 }
 
 RelativeOrbit relative_orbit_of(const SeparationState& now) {
@@ -124,28 +162,39 @@ bool SeparationMonitor::must_escape(const SeparationForecast& forecast, bool in_
   return !(forecast.minimum_m >= (in_science ? options_.science_m : options_.elsewhere_m));
 }
 
-// In one revolution if the impulse limits allow, or else in the least number of halves that do.
+// In one revolution if the impulse limits allow, or else in the least number of halves that do. The
+// cheapest direction that keeps `clear_m` on the way, or else the one that keeps most.
 TransferPlan SeparationMonitor::escape(const SeparationState& now, std::int64_t earliest_ns) const {
-  const RelativeOrbit orbit = relative_orbit_of(now);
-  const double revolution_s = kTwoPi / secular_rates(orbit.chief).u_radps;
-  TransferPlan plan;
+  TransferStart start;
+  start.orbit = relative_orbit_of(now);
+  const double revolution_s = kTwoPi / secular_rates(start.orbit.chief).u_radps;
+  TransferOptions options;
+  options.limits = options_.limits;
+  options.first_ns = earliest_ns;
+  options.waypoints = 0;
+  options.budget_mps = 1e3;           // whatever it costs
+  options.min_radial_normal_m = 0.0;  // nothing is safer than to try
+  TransferPlan best;
+  double best_m = -1.0;
   for (const double revolutions : {1.0, 1.5, 2.0, 3.0}) {
     TransferGoal goal;
     goal.end_ns = earliest_ns + nanoseconds(revolutions * revolution_s);
     goal.along_track_free = true;
-    TransferStart start;
-    start.orbit = orbit;
-    goal.a_roe = cheapest_target(coast(start, goal.end_ns), kEscapeMargin * options_.escape_m);
-    TransferOptions options;
-    options.limits = options_.limits;
-    options.first_ns = earliest_ns;
-    options.waypoints = 0;
-    options.budget_mps = 1e3;           // whatever it costs
-    options.min_radial_normal_m = 0.0;  // nothing is safer than to try
-    plan = ReconfigurationPlanner(options).plan(start, goal);
-    if (plan.usable()) break;
+    const RelativeElements then = coast(start, goal.end_ns);
+    for (const RelativeElements& target :
+         targets_by_cost(then, kEscapeMargin * options_.escape_m)) {
+      goal.a_roe = target;
+      TransferPlan plan = ReconfigurationPlanner(options).plan(start, goal);
+      if (!plan.usable()) continue;
+      const double closest_m = closest_approach_m(start.orbit, plan.burns);
+      if (closest_m <= best_m) continue;
+      best = std::move(plan);
+      best_m = closest_m;
+      if (best_m >= options_.clear_m) return best;
+    }
+    if (best.usable()) break;
   }
-  return plan;
+  return best;
 }
 
 }  // namespace formation_gnc

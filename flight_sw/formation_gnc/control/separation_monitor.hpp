@@ -5,8 +5,9 @@
 ///             P_RN(u)). Relative elements and covariance drift under J2; a*da need not be zero.
 ///             Along-track distance counts for nothing.
 /// Escape      Burns over one revolution to parallel e and i vectors of more than `escape_m` and no
-///             a*da, at the phase at which that costs least. One burn cannot do it: radial and
-///             normal burns turn the vectors apart, tangential ones leave a*da.
+///             a*da, at the phase at which that costs least of those that keep clear of the other
+///             on the way. One burn cannot do it: radial and normal burns turn the vectors apart,
+///             tangential ones leave a*da.
 /// Accuracy    The map to RTN is of first order in e: 1e-3 of the elements, a*dl included. Samples
 ///             every 3 deg miss the minimum by 2.6 % of the vectors' length where it is zero, and
 ///             by less than 0.1 % where they are parallel.
@@ -25,6 +26,7 @@ struct SeparationOptions {
   double science_m = 10.0;    ///< escape below that, in science
   double elsewhere_m = 50.0;  ///< and below that, in any other mode
   double escape_m = 80.0;     ///< what an escape reaches at least
+  double clear_m = 20.0;      ///< and what it keeps on the way, along-track included, if it can
   ImpulseLimits limits = {};
 };
 
