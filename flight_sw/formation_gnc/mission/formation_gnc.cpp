@@ -380,6 +380,7 @@ Situation FormationGnc::situation(const FormationEstimate& estimate) const {
   // Gauss: d(a*da)/dt = 2 a_T / n.
   const double n_radps = mean_motion_radps(osculating_from_state(s.chief).a_m);
   s.a_da_rate_mps = 2.0 * e.drag_difference_mps2 / n_radps;
+  s.budget_mps = configuration_.mission.delta_v_budget_mps - delta_v_mps_;
   return s;
 }
 
@@ -550,6 +551,8 @@ void FormationGnc::send_telemetry(std::int64_t now_ns, const FormationEstimate& 
   t.graphic = graphic_.telemetry();
   t.sdcp = sdcp_.telemetry();
   fill_integers(&t);
+  t.thruster_scale = scale_.scale();
+  t.sigma_thruster_scale = scale_.sigma();
   t.flags = (estimate.valid ? 1u : 0u) | (estimate.fixed ? 2u : 0u) |
             (partner_heard_ns_ != 0 ? 4u : 0u) | (protocol.has_pending() ? 8u : 0u);
   unsigned char message[FORMATION_GNC_TELEMETRY_BYTES];

@@ -101,6 +101,8 @@ void ManeuverManager::plan_to(const Situation& now, const TransferGoal& goal,
   options.first_ns = earliest_ns(now);
   options.last_ns = last_ns;
   options.waypoints = options_.waypoints;
+  // Nothing left is a budget that no plan keeps to.
+  options.budget_mps = std::max(std::min(options.budget_mps, now.budget_mps), 1e-9);
   TransferStart start;
   start.orbit = relative_orbit(now);
   start.a_da_rate_mps = now.a_da_rate_mps;

@@ -5,7 +5,8 @@
 ///             last 40 min trims by numerical prediction (fine_alignment.hpp).
 /// Escape      the escape of separation_monitor.hpp, within the thruster's limits as they are here.
 /// Standby, safe  nothing.
-/// A plan that cannot be made leaves the one before in force: that leads to the goal it had.
+/// A plan that cannot be made, or costs more than propellant allows, leaves the one before in
+/// force: that leads to the goal it had.
 /// One burn is commanded at a time, `burn_lead_s` ahead.
 #pragma once
 
@@ -42,6 +43,7 @@ struct Situation {
   flight_support::Matrix6 relative_covariance_RTN;
   double sigma_r_m = 0.0;      ///< 3D
   double a_da_rate_mps = 0.0;  ///< d(a*da)/dt by differential drag, of the deputy
+  double budget_mps = 1e3;     ///< what propellant is left for; an escape does not ask
 };
 
 class ManeuverManager {

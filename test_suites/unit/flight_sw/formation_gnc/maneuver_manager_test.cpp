@@ -139,6 +139,26 @@ TEST(ManeuverManagerTest, APlanThatCannotBeMadeLeavesTheOneBefore) {
   EXPECT_EQ(manager.plan().delta_v_mps, planned_mps);
 }
 
+// Of 200 m of a*de and a*di to 150 m, 0.08 m/s by the separate bound, 0.04 m/s are left: nothing is
+// commanded, and why is said. With enough left it is.
+TEST(ManeuverManagerTest, ATransferBeyondThePropellantIsNotBegun) {
+  const FieldGravity gravity;
+  for (const double budget_mps : {0.04, -1.0, 0.2}) {
+    ManeuverManager manager(gravity);
+    Loop loop(roe(0, 0, 0, 200, 0, 200));
+    loop.now.budget_mps = budget_mps;
+    Event transfer = event_of(Mode::kTransfer, loop.now.t_ns, 10);
+    transfer.a_m = transfer.b_m = 150;
+    manager.enter(transfer);
+    loop.fly(&manager, 7190);
+    ASSERT_EQ(manager.plans(), 1u);
+    const bool enough = budget_mps > 0.1;
+    EXPECT_EQ(loop.burns.empty(), !enough) << budget_mps;
+    if (enough) continue;
+    EXPECT_STREQ(manager.trouble(), to_string(PlanStatus::kOverBudget));
+  }
+}
+
 // Differential drag of 2.8e-8 m/s^2, 5.1e-5 m/s of a*da, carries a*dl 0.75 n 5.1e-5 t^2 = 54 m in
 // 10 h. A plan that is told of it arrives all the same, one that is not by that much off.
 TEST(ManeuverManagerTest, PlansTakeDifferentialDragIntoAccount) {
