@@ -93,7 +93,7 @@ class RpoKit {
   RelativeNavigation navigation_;
   Approach approach_;
   Autonomy autonomy_;
-  std::int64_t last_crosslink_slot_ = -1, last_telemetry_slot_ = -1, last_decision_ns_ = 0;
+  std::int64_t last_crosslink_slot_ = -1, last_telemetry_slot_ = -1;
   double delta_v_mps_ = 0.0;
   std::uint32_t burns_ = 0, rejected_ = 0;
 };
