@@ -1,14 +1,13 @@
 /// What the Earth's surface reflects, and what it emits by night.
 #pragma once
 
-#include <orrery/models/camera/image.hpp>
+#include <orrery/models/frames/vector.hpp>
 
-#include <string>
+#include <vector>
 
 namespace orrery {
 
-/// Equirectangular maps: longitude -180 to 180 deg from left to right, latitude 90 to -90 deg
-/// downwards.
+/// Kept on the six faces of a cube, so that a look-up needs no angles: cells of 0.09 to 0.22 deg.
 class EarthSurface {
  public:
   /// The same everywhere, dark by night. @throws std::invalid_argument  albedo outside 0 to 1.
@@ -23,11 +22,13 @@ class EarthSurface {
   struct Sample {
     float albedo = 0, night = 0;  // night: radiance over that of a white surface in full sunlight
   };
-  /// Of the nearest point of the map. @param longitude_rad -pi to pi; latitude_rad -pi/2 to pi/2.
-  Sample at(float longitude_rad, float latitude_rad) const;
+  /// In a direction of any length above 0: the normal of the ellipsoid there, ECEF. Linear between
+  /// the cells of a face.
+  Sample at(const Vec3& normal_ECEF) const;
 
  private:
-  Image<Sample> map_;
+  int cells_ = 1;  // along an edge of a face
+  std::vector<Sample> faces_;
 };
 
 }  // namespace orrery

@@ -14,7 +14,7 @@ namespace {
 constexpr double kSpeedOfLight_mps = 299792458.0;
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kAtmosphereScales = 10;
-constexpr double kWater = 0.08;
+constexpr double kWater = 0.06, kLand = 0.10;  // albedo
 constexpr double kGlintReflectance = 0.02, kGlintExponent = 30;
 
 void check(const char* option, double value, double low, double high) {
@@ -22,17 +22,6 @@ void check(const char* option, double value, double low, double high) {
     throw std::invalid_argument("EarthView: " + std::string(option) + " = " + to_text(value) +
                                 "; accepted: " + to_text(low) + " to " + to_text(high));
   }
-}
-
-// Abramowitz & Stegun 4.4.49: within 1e-5, far below a cell of the map; one code, equal bits.
-float arc_tangent(float y, float x) {
-  const float ay = std::abs(y), ax = std::abs(x);
-  const float t = std::min(ax, ay) / std::max({ax, ay, 1e-30f}), s = t * t;
-  float a =
-      t * (0.9998660f + s * (-0.3302995f + s * (0.1801410f + s * (-0.0851330f + s * 0.0208351f))));
-  if (ay > ax) a = 1.57079633f - a;
-  if (x < 0) a = 3.14159265f - a;
-  return y < 0 ? -a : a;
 }
 
 // Everything in Earth-fixed axes, z stretched so that the ellipsoid is a sphere of radius 1.
@@ -57,11 +46,10 @@ class EarthRays {
     double a = 0, b = 0;  // of a t^2 + 2 b t + c = 0
     double height = 0;    // of the tangent point over the surface, over the radius: about
   };
-  // From the direction in which it is seen: not aberrated, to first order (1e-9).
+  // From the direction (unit vector) in which it is seen: not aberrated, to first order (1e-9).
   Crossing cross(const Vec3& seen_C) const {
     Crossing x;
-    const Vec3 u = unit(seen_C);
-    x.d_E = R_EC_ * (u - beta_C_ + dot(u, beta_C_) * u);
+    x.d_E = R_EC_ * (seen_C - beta_C_ + dot(seen_C, beta_C_) * seen_C);
     x.q = {x.d_E.x, x.d_E.y, x.d_E.z * stretch_};
     x.a = dot(x.q, x.q), x.b = dot(x.q, p_);
     x.height = 0.5 * (c_ - x.b * x.b / x.a);
@@ -92,14 +80,12 @@ class EarthRays {
     const double t = (-x.b - root) / x.a;
     const Vec3 s = p_ + t * x.q;  // on the unit sphere
     const Vec3 normal = unit({s.x, s.y, s.z * stretch_});
-    const float across = static_cast<float>(std::sqrt(normal.x * normal.x + normal.y * normal.y));
-    const EarthSurface::Sample map =
-        options_.surface.at(arc_tangent(static_cast<float>(normal.y), static_cast<float>(normal.x)),
-                            arc_tangent(static_cast<float>(normal.z), across));
+    const EarthSurface::Sample map = options_.surface.at(normal);
     const double cosine = dot(normal, to_sun_);
     if (cosine <= 0) return sun_ / kPi * double(map.night);
     double radiance = sun_ / kPi * double(map.albedo) * cosine;
-    if (options_.glint && map.albedo < kWater) radiance += glint(x, normal, cosine);
+    const double water = std::clamp((kLand - double(map.albedo)) / (kLand - kWater), 0.0, 1.0);
+    if (options_.glint && water > 0) radiance += water * glint(x, normal, cosine);
     return radiance;
   }
   double glint(const Crossing& x, const Vec3& normal, double cosine) const {
@@ -153,7 +139,7 @@ void EarthView::add(Image<float>& suns, Image<float>& covered, const Image<Pixel
       const PixelRay& ray = rays.values[k];
       const double solid_angle = ray.solid_angle_sr;
       const EarthRays::Seen seen =
-          earth.look(earth.cross({ray.x, ray.y, 1}), std::sqrt(solid_angle));
+          earth.look(earth.cross({ray.x, ray.y, ray.z}), std::sqrt(solid_angle));
       suns.values[k] += weight * static_cast<float>(seen.radiance * solid_angle);
       covered.values[k] += weight * static_cast<float>(seen.covered);
     }

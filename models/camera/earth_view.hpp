@@ -2,6 +2,7 @@
 #pragma once
 
 #include <orrery/models/camera/earth_surface.hpp>
+#include <orrery/models/camera/image.hpp>
 #include <orrery/models/camera/pixel_rays.hpp>
 #include <orrery/models/frames/vector.hpp>
 
@@ -29,10 +30,10 @@ struct EarthPose {
 ///             where the Sun is down. The edge of the solid Earth covers a pixel by the distance of
 ///             its tangent from the pixel's centre. Above it the atmosphere: brightness of the limb
 ///             under the Sun's height there, falling by e per scale height. Glint: a lobe of
-///             half-width 12 deg about the mirror direction on surfaces of albedo below 0.08, at 2
-///             % reflectance.
+///             half-width 12 deg about the mirror direction, at 2 % reflectance, in full on albedos
+///             below 0.06, none on 0.10 and above.
 /// Not there   Clouds, haze above the disc, refraction, colour.
-/// Checked by  test_suites/unit/models/camera/earth_view_test.cpp: limb, flux of the whole disc.
+/// Checked by  test_suites/unit/models/camera/scene_test.cpp: limb, flux of the whole disc.
 class EarthView {
  public:
   /// @throws std::invalid_argument  an option outside its range.

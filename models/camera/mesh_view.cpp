@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <thread>
 
 namespace orrery {
 
@@ -14,9 +15,11 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kAcrossAPoint = 128, kAcross = 1024;
 constexpr double kLeastPerPixel = 2, kMostPerPixel = 16;
+constexpr double kLargestShadowMap = 512;
 constexpr double kNearest_m = 1e-3;
 constexpr double kMargin_px = 30;  // beyond the image: what the PSF brings in
-constexpr int kSolidAngleStep = 8;
+constexpr int kBlock = 16;         // samples that share one solid angle, across and down
+constexpr double kSpreadPerPixel = 4, kSpreadAcross = 32;  // samples that the PSF needs
 
 // A point needs its flux only; what has edges needs them in place.
 double samples_per_px(double size_px) {
@@ -98,21 +101,25 @@ void scan(DepthGrid& grid, const Corners& c, int id, int first_row, int end_row)
 // What lies in sunlight: the nearest triangle to the Sun on a grid normal to its direction.
 class ShadowMap {
  public:
-  ShadowMap(const Mesh& mesh, const Vec3& to_sun_B, double size)
+  ShadowMap(const Mesh& mesh, const Vec3& to_sun_B, double size, int threads)
       : radius_(mesh.radius_m()),
         z_(to_sun_B),
         x_(unit(std::abs(z_.x) < 0.7 ? cross({1, 0, 0}, z_) : cross({0, 1, 0}, z_))),
         y_(cross(z_, x_)),
         grid_(static_cast<int>(size), static_cast<int>(size)),
         scale_(size / (2 * radius_)) {
-    const auto& triangles = mesh.triangles();
-    for (std::size_t k = 0; k < triangles.size(); ++k) {
-      Corners corners;
-      for (std::size_t i = 0; i < 3; ++i) {
-        corners[i] = place(mesh.vertices_B()[static_cast<std::size_t>(triangles[k].corners[i])]);
+    std::vector<Corner> places;
+    for (const Vec3& vertex : mesh.vertices_B()) places.push_back(place(vertex));
+    for_bands_of_rows(threads, grid_.rows, [&](int first, int end) {
+      const auto& triangles = mesh.triangles();
+      for (std::size_t k = 0; k < triangles.size(); ++k) {
+        const auto& c = triangles[k].corners;
+        const Corners corners{places[static_cast<std::size_t>(c[0])],
+                              places[static_cast<std::size_t>(c[1])],
+                              places[static_cast<std::size_t>(c[2])]};
+        if (doubled_area(corners) > 0) scan(grid_, corners, static_cast<int>(k), first, end);
       }
-      if (doubled_area(corners) > 0) scan(grid_, corners, static_cast<int>(k), 0, grid_.rows);
-    }
+    });
   }
 
   bool is_lit(const Vec3& p_B, int triangle, double cosine) const {
@@ -174,10 +181,11 @@ class MeshSampler {
     MeshSamples out;
     if (!project() || !lay_out(out)) return out;
     light_facets();
+    measure_blocks(out);
     DepthGrid grid(out.columns, out.rows);
     for_bands_of_rows(threads, out.rows, [&](int first, int end) { scan_all(grid, first, end); });
-    const double across = across_samples_;
-    const ShadowMap shadows(mesh_, shading_.to_sun_B(), std::clamp(across, kAcrossAPoint, 1024.0));
+    const ShadowMap shadows(mesh_, shading_.to_sun_B(),
+                            std::clamp(across_samples_, kAcrossAPoint, kLargestShadowMap), threads);
     out.suns.assign(grid.triangle.size(), 0);
     out.covered.assign(grid.triangle.size(), 0);
     for_bands_of_rows(threads, out.rows,
@@ -257,27 +265,33 @@ class MeshSampler {
 
   void shade(MeshSamples& out, const DepthGrid& grid, const ShadowMap& shadows, int first,
              int end) const {
-    const double per_sample = 1 / (out.per_px_u * out.per_px_v);
+    const std::size_t blocks = static_cast<std::size_t>(block_columns_);
     for (int row = first; row < end; ++row) {
-      double solid_angle = 0;
+      const double* solid_angles = &solid_angles_[static_cast<std::size_t>(row / kBlock) * blocks];
       for (int column = 0; column < out.columns; ++column) {
-        if (column % kSolidAngleStep == 0) {
-          solid_angle = per_sample * solid_angle_sr(out, column, row);
-        }
         const std::size_t at = grid.index(column, row);
         const int id = grid.triangle[at];
         if (id < 0) continue;
         out.covered[at] = 1;
-        out.suns[at] = static_cast<float>(solid_angle * radiance(id, column, row, shadows));
+        out.suns[at] =
+            static_cast<float>(solid_angles[column / kBlock] * radiance(id, column, row, shadows));
       }
     }
   }
 
-  double solid_angle_sr(const MeshSamples& s, int column, int row) const {
-    const double u = s.left + (column + 0.5 * kSolidAngleStep) / s.per_px_u;
-    const double v = s.top + (row + 0.5) / s.per_px_v;
-    return camera_.solid_angle_sr({std::clamp(u, -0.5, camera_.width_px() - 0.5),
-                                   std::clamp(v, -0.5, camera_.height_px() - 0.5)});
+  // Of a sample [sr], for each block.
+  void measure_blocks(const MeshSamples& s) {
+    const double per_sample = 1 / (s.per_px_u * s.per_px_v);
+    block_columns_ = (s.columns + kBlock - 1) / kBlock;
+    for (int row = 0; row < s.rows; row += kBlock) {
+      const double v = s.top + (row + 0.5 * kBlock) / s.per_px_v;
+      for (int column = 0; column < s.columns; column += kBlock) {
+        const double u = s.left + (column + 0.5 * kBlock) / s.per_px_u;
+        const Pixel at{std::clamp(u, -0.5, camera_.width_px() - 0.5),
+                       std::clamp(v, -0.5, camera_.height_px() - 0.5)};
+        solid_angles_.push_back(per_sample * camera_.solid_angle_sr(at));
+      }
+    }
   }
 
   // What all points of a triangle share.
@@ -324,6 +338,8 @@ class MeshSampler {
   Vec3 centre_C_, camera_B_;
   std::vector<Corner> corners_;
   std::vector<Facet> facets_;
+  std::vector<double> solid_angles_;
+  int block_columns_ = 0;
   double across_samples_ = 0;
 };
 
@@ -357,15 +373,42 @@ struct Spread {
   const float* of(int sample) const { return &parts[most * static_cast<std::size_t>(sample)]; }
 };
 
+// Samples joined by `step` in each direction where they are finer than the PSF needs: the sums, at
+// the middle of those that are joined.
+struct JoinedSamples {
+  int columns = 0, rows = 0;
+  double per_px_u = 1, per_px_v = 1;
+  std::vector<float> suns, covered;
+
+  JoinedSamples(const MeshSamples& s, int step)
+      : columns((s.columns + step - 1) / step),
+        rows((s.rows + step - 1) / step),
+        per_px_u(s.per_px_u / step),
+        per_px_v(s.per_px_v / step),
+        suns(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows)),
+        covered(suns.size()) {
+    std::size_t from = 0;
+    for (int row = 0; row < s.rows; ++row) {
+      const std::size_t line =
+          static_cast<std::size_t>(row / step) * static_cast<std::size_t>(columns);
+      for (int column = 0; column < s.columns; ++column, ++from) {
+        if (s.covered[from] == 0) continue;
+        const std::size_t to = line + static_cast<std::size_t>(column / step);
+        suns[to] += s.suns[from];
+        covered[to] += 1;
+      }
+    }
+  }
+};
+
 // One row of samples across, then down.
-template <class Value>
-void spread_rows(Image<float>& image, const MeshSamples& s, const std::vector<Value>& values,
+void spread_rows(Image<float>& image, const JoinedSamples& s, const std::vector<float>& values,
                  const Spread& across, const Spread& down, double factor) {
   std::vector<float> line(static_cast<std::size_t>(image.width_px));
   for (int row = 0; row < s.rows; ++row) {
     std::fill(line.begin(), line.end(), 0.0f);
     int low = image.width_px, high = -1;
-    const Value* value =
+    const float* value =
         &values[static_cast<std::size_t>(row) * static_cast<std::size_t>(s.columns)];
     for (int k = 0; k < s.columns; ++k) {
       if (value[k] == 0) continue;
@@ -419,12 +462,25 @@ MeshSamples sample_mesh(const Mesh& mesh, const PinholeCamera& camera, const Mes
 }
 
 void add_samples(ElectronImage& image, Image<float>& covered, const MeshSamples& s,
-                 double electrons_per_sun, double psf_sigma_px, double weight) {
+                 double electrons_per_sun, double psf_sigma_px, double weight, int threads) {
   if (s.suns.empty()) return;
-  const Spread across(s.columns, s.left, s.per_px_u, psf_sigma_px, image.width_px);
-  const Spread down(s.rows, s.top, s.per_px_v, psf_sigma_px, image.height_px);
-  spread_rows(image, s, s.suns, across, down, weight * electrons_per_sun);
-  spread_rows(covered, s, s.covered, across, down, weight / (s.per_px_u * s.per_px_v));
+  const double finest = std::min(s.per_px_u, s.per_px_v);
+  const double size_px = s.columns / s.per_px_u;
+  const double enough = std::max(kSpreadPerPixel, kSpreadAcross / size_px);
+  const JoinedSamples joined(s, std::max(1, static_cast<int>(finest / enough)));
+  const Spread across(joined.columns, s.left, joined.per_px_u, psf_sigma_px, image.width_px);
+  const Spread down(joined.rows, s.top, joined.per_px_v, psf_sigma_px, image.height_px);
+  const auto spread_covered = [&] {
+    spread_rows(covered, joined, joined.covered, across, down, weight / (s.per_px_u * s.per_px_v));
+  };
+  std::thread other;
+  if (threads > 1) other = std::thread(spread_covered);
+  spread_rows(image, joined, joined.suns, across, down, weight * electrons_per_sun);
+  if (threads > 1) {
+    other.join();
+  } else {
+    spread_covered();
+  }
 }
 
 }  // namespace orrery

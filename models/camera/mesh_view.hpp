@@ -36,7 +36,7 @@ struct MeshSamples {
 ///             1024 across, 2 to the pixel from 512 px on. The grid ends where the target does.
 ///             Back faces are left out, and triangles that reach behind 1 mm before the pinhole.
 ///             Sunlight by a shadow map along the Sun's direction, at least as fine as the grid up
-///             to 1024 across; Earthshine without shadows. Each sample counts with its own solid
+///             to 512 across; Earthshine without shadows. Each sample counts with its own solid
 ///             angle.
 /// Errors      An edge is in place to half a sample at worst, along rows or columns. Edges of large
 ///             triangles are straight in the image: the lens's bend along them is left out.
@@ -47,6 +47,6 @@ MeshSamples sample_mesh(const Mesh& mesh, const PinholeCamera& camera, const Mes
 /// Spreads the samples over the pixels by the PSF, each integrated over the pixels.
 /// @param covered  To which the covered part of each pixel, blurred likewise, is added.
 void add_samples(ElectronImage& image, Image<float>& covered, const MeshSamples& samples,
-                 double electrons_per_sun, double psf_sigma_px, double weight = 1);
+                 double electrons_per_sun, double psf_sigma_px, double weight = 1, int threads = 1);
 
 }  // namespace orrery

@@ -7,7 +7,7 @@
 namespace orrery {
 
 struct PixelRay {
-  float x = 0, y = 0;  // X/Z, Y/Z in camera axes
+  float x = 0, y = 0, z = 1;  // unit vector in camera axes
   float solid_angle_sr = 0;
 };
 
@@ -17,7 +17,7 @@ inline Image<PixelRay> pixel_rays(const PinholeCamera& camera) {
     for (int u = 0; u < rays.width_px; ++u) {
       const Pixel at{double(u), double(v)};
       const Vec3 d = camera.direction_C(at);
-      rays.at(u, v) = {static_cast<float>(d.x / d.z), static_cast<float>(d.y / d.z),
+      rays.at(u, v) = {static_cast<float>(d.x), static_cast<float>(d.y), static_cast<float>(d.z),
                        static_cast<float>(camera.solid_angle_sr(at))};
     }
   }

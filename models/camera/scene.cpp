@@ -32,11 +32,20 @@ double focal_px(const PinholeCamera& camera) {
   return std::max(camera.fx_px(), camera.fy_px());
 }
 
+// Calls work(k) for all values of an image.
+template <class Work>
+void for_all(int threads, const Image<float>& image, const Work& work) {
+  for_bands_of_rows(threads, image.height_px, [&image, &work](int first, int end) {
+    for (std::size_t k = image.index(0, first); k < image.index(0, end); ++k) work(k);
+  });
+}
+
 // `upper` covers what `lower` has.
-void cover(ElectronImage& lower, const Image<float>& covered, const ElectronImage& upper) {
-  for (std::size_t k = 0; k < lower.values.size(); ++k) {
+void cover(ElectronImage& lower, const Image<float>& covered, const ElectronImage& upper,
+           int threads) {
+  for_all(threads, lower, [&](std::size_t k) {
     lower.values[k] = lower.values[k] * std::max(0.0f, 1 - covered.values[k]) + upper.values[k];
-  }
+  });
 }
 
 }  // namespace
@@ -127,16 +136,14 @@ void Scene::draw_background(SceneFrame& frame, const SceneState& state,
       earth_.add(suns, covered, rays_, earth_pose(state, dt), 1.0f / static_cast<float>(count),
                  threads);
     }
-    cover(sky, covered, suns);
+    cover(sky, covered, suns, threads);
   }
   const bool is_empty = !has_earth && std::all_of(sky.values.begin(), sky.values.end(),
                                                   [](float suns) { return suns == 0; });
   if (is_empty) return;
   blur(sky, optics_.options().psf_sigma_px, threads);
   const float scale = static_cast<float>(optics_.electrons_ps_of_suns(exposure.duration_s));
-  for (std::size_t k = 0; k < sky.values.size(); ++k) {
-    frame.light.values[k] = scale * sky.values[k];
-  }
+  for_all(threads, sky, [&](std::size_t k) { frame.light.values[k] = scale * sky.values[k]; });
 }
 
 void Scene::draw_discs(Image<float>& suns, const SceneState& state, const Mat3& R_CI,
@@ -168,69 +175,91 @@ void Scene::draw_discs(Image<float>& suns, const SceneState& state, const Mat3& 
   }
 }
 
+struct Scene::TargetView {
+  const Mesh& mesh;
+  const TargetState& target;
+  const CameraPose& camera;
+  Lighting light;
+  double row_s = 0;  // from the middle of the exposure to that of the row of its middle
+
+  Vec3 r_TC_ECI() const { return target.r_ECI - camera.r_ECI; }
+  Vec3 v_TC_ECI() const { return target.v_ECI - camera.v_ECI; }
+  MeshPose at(double dt) const {
+    return {.R_CI = camera.R_CI_after(row_s + dt),
+            .R_TI = rotation_by((row_s + dt) * target.omega_TI_T) * target.R_TI,
+            .r_TC_ECI = r_TC_ECI() + (row_s + dt) * v_TC_ECI()};
+  }
+};
+
+bool Scene::is_behind_the_earth(const Vec3& r_TC_ECI, const SceneState& state) const {
+  if (!options_.earth) return false;
+  const double distance = norm(r_TC_ECI);
+  const double to_tangent = -dot(state.camera.r_ECI, r_TC_ECI) / distance;
+  return distance > to_tangent && earth_.hides(r_TC_ECI / distance, earth_pose(state, 0));
+}
+
 std::optional<SeenTarget> Scene::draw_target(SceneFrame& frame, Image<float>& covered,
                                              std::size_t index, const SceneState& state,
                                              const ExposureTime& exposure, int threads) const {
-  const Mesh& mesh = options_.targets[index];
-  const TargetState& target = state.targets[index];
-  const CameraPose& camera = state.camera;
-  const Vec3 r_TC = target.r_ECI - camera.r_ECI, v_TC = target.v_ECI - camera.v_ECI;
-  const double distance = norm(r_TC);
-  const std::optional<Pixel> origin = camera_.project(camera.R_CI * r_TC);
-  if (!origin) return {};
-  const EarthPose earth = earth_pose(state, 0);
-  if (options_.earth && earth_.hides(r_TC / distance, earth) &&
-      distance > -dot(camera.r_ECI, r_TC) / distance) {
-    return {};
-  }
-  const Lighting light = lighting_at(target.r_ECI, state.r_sun_ECI);
-  const double per_sun = optics_.electrons_ps_of_suns(1);
-  const double row_s =
-      (std::clamp(origin->v, 0.0, camera_.height_px() - 1.0) - 0.5 * (camera_.height_px() - 1)) *
-      exposure.row_period_s;
-  const auto pose_at = [&](double dt) {
-    return MeshPose{.R_CI = camera.R_CI_after(dt),
-                    .R_TI = rotation_by(dt * target.omega_TI_T) * target.R_TI,
-                    .r_TC_ECI = r_TC + dt * v_TC};
-  };
-  const MeshSamples middle = sample_mesh(mesh, camera_, pose_at(row_s), light, threads);
-  SeenTarget seen{.origin = *origin,
-                  .photocentre = middle.suns.empty() ? *origin : middle.photocentre(),
-                  .electrons = middle.total_suns() * per_sun * exposure.duration_s,
-                  .size_px = 2 * mesh.radius_m() * focal_px(camera_) / distance};
-  if (middle.suns.empty()) return seen;
+  TargetView view{.mesh = options_.targets[index],
+                  .target = state.targets[index],
+                  .camera = state.camera,
+                  .light = lighting_at(state.targets[index].r_ECI, state.r_sun_ECI)};
+  const Vec3 r_TC = view.r_TC_ECI();
+  const std::optional<Pixel> origin = camera_.project(state.camera.R_CI * r_TC);
+  if (!origin || is_behind_the_earth(r_TC, state)) return {};
+  const double middle_row = 0.5 * (camera_.height_px() - 1);
+  view.row_s = (std::clamp(origin->v, 0.0, 2 * middle_row) - middle_row) * exposure.row_period_s;
+  const MeshSamples samples = sample_mesh(view.mesh, camera_, view.at(0), view.light, threads);
+  SeenTarget seen{
+      .origin = *origin,
+      .photocentre = samples.suns.empty() ? *origin : samples.photocentre(),
+      .electrons = optics_.electrons_ps_of_suns(samples.total_suns()) * exposure.duration_s,
+      .size_px = 2 * view.mesh.radius_m() * focal_px(camera_) / norm(r_TC)};
+  if (samples.suns.empty()) return seen;
   if (seen.size_px < kPointBelow_px) {
-    const Mat3 R_IC = transpose(camera.R_CI_after(row_s));
-    const Vec3 line_C = distance * camera_.direction_C(seen.photocentre);
-    add_source(frame.light, camera_, optics_, camera, exposure,
-               {.line_of_sight_ECI = R_IC * line_C - row_s * v_TC,
-                .rate_ECI_ps = v_TC,
-                .electrons_ps = middle.total_suns() * per_sun});
-    return seen;
-  }
-  const double half = 0.5 * exposure.duration_s;
-  const std::optional<Pixel> begin =
-      camera_.project(pose_at(row_s - half).R_CI * pose_at(row_s - half).r_TC_ECI);
-  const std::optional<Pixel> end =
-      camera_.project(pose_at(row_s + half).R_CI * pose_at(row_s + half).r_TC_ECI);
-  const int count = begin && end ? instants(std::hypot(end->u - begin->u, end->v - begin->v)) : 1;
-  ElectronImage layer(frame.light.width_px, frame.light.height_px);
-  Image<float> layer_covered(frame.light.width_px, frame.light.height_px);
-  for (int k = 0; k < count; ++k) {
-    const double dt = row_s + instant_s(k, count, exposure.duration_s);
-    add_samples(layer, layer_covered,
-                count == 1 ? middle : sample_mesh(mesh, camera_, pose_at(dt), light, threads),
-                per_sun * exposure.duration_s, optics_.options().psf_sigma_px, 1.0 / count);
-  }
-  cover(frame.light, layer_covered, layer);
-  if (covered.values.empty()) {
-    covered = std::move(layer_covered);
+    draw_point(frame.light, view, seen, exposure);
   } else {
-    for (std::size_t k = 0; k < covered.values.size(); ++k) {
-      covered.values[k] = std::max(covered.values[k], layer_covered.values[k]);
-    }
+    draw_mesh(frame.light, covered, view, samples, exposure, threads);
   }
   return seen;
+}
+
+void Scene::draw_point(ElectronImage& image, const TargetView& view, const SeenTarget& seen,
+                       const ExposureTime& exposure) const {
+  if (!camera_.is_inside(seen.photocentre, 8 * optics_.options().psf_sigma_px)) return;
+  const MeshPose pose = view.at(0);
+  const Vec3 line_C = norm(pose.r_TC_ECI) * camera_.direction_C(seen.photocentre);
+  const Vec3 line_ECI = transpose(pose.R_CI) * line_C;
+  add_source(image, camera_, optics_, view.camera, exposure,
+             {.line_of_sight_ECI = line_ECI - view.row_s * view.v_TC_ECI(),
+              .rate_ECI_ps = view.v_TC_ECI(),
+              .electrons_ps = seen.electrons / exposure.duration_s});
+}
+
+void Scene::draw_mesh(ElectronImage& image, Image<float>& covered, const TargetView& view,
+                      const MeshSamples& middle, const ExposureTime& exposure, int threads) const {
+  const auto origin_at = [&](double dt) {
+    const MeshPose pose = view.at(dt);
+    return camera_.project(pose.R_CI * pose.r_TC_ECI);
+  };
+  const double half = 0.5 * exposure.duration_s;
+  const std::optional<Pixel> begin = origin_at(-half), end = origin_at(half);
+  const int count = begin && end ? instants(std::hypot(end->u - begin->u, end->v - begin->v)) : 1;
+  ElectronImage layer(image.width_px, image.height_px);
+  Image<float> layer_covered(image.width_px, image.height_px);
+  const double electrons_per_sun = optics_.electrons_ps_of_suns(exposure.duration_s);
+  for (int k = 0; k < count; ++k) {
+    const MeshPose pose = view.at(instant_s(k, count, exposure.duration_s));
+    add_samples(layer, layer_covered,
+                count == 1 ? middle : sample_mesh(view.mesh, camera_, pose, view.light, threads),
+                electrons_per_sun, optics_.options().psf_sigma_px, 1.0 / count, threads);
+  }
+  cover(image, layer_covered, layer, threads);
+  if (covered.values.empty()) covered = Image<float>(image.width_px, image.height_px);
+  for_all(threads, covered, [&](std::size_t k) {
+    covered.values[k] = std::max(covered.values[k], layer_covered.values[k]);
+  });
 }
 
 void Scene::draw_stray_light(ElectronImage& image, const SceneState& state,

@@ -85,6 +85,12 @@ class Scene {
   std::optional<SeenTarget> draw_target(SceneFrame& frame, Image<float>& covered, std::size_t index,
                                         const SceneState& state, const ExposureTime& exposure,
                                         int threads) const;
+  struct TargetView;
+  bool is_behind_the_earth(const Vec3& r_TC_ECI, const SceneState& state) const;
+  void draw_point(ElectronImage& image, const TargetView& view, const SeenTarget& seen,
+                  const ExposureTime& exposure) const;
+  void draw_mesh(ElectronImage& image, Image<float>& covered, const TargetView& view,
+                 const MeshSamples& middle, const ExposureTime& exposure, int threads) const;
   void draw_stray_light(ElectronImage& image, const SceneState& state, double exposure_s) const;
   EarthPose earth_pose(const SceneState& state, double dt_s) const;
 

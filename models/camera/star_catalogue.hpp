@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace orrery {
@@ -42,7 +43,8 @@ class StarCatalogue {
   /// it is not installed; says what to install.
   static StarCatalogue bright_stars();
 
-  const std::vector<Star>& stars() const { return stars_; }  // brightest first
+  const std::vector<Star>& stars() const& { return stars_; }  // brightest first
+  std::vector<Star> stars() && { return std::move(stars_); }
   /// Those of V at most `magnitude`.
   StarCatalogue to_magnitude(double magnitude) const;
 

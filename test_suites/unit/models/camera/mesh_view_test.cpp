@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "angles.hpp"
 #include "opencv_projection.hpp"
 
 namespace orrery {
@@ -19,8 +20,6 @@ namespace {
 using std::numbers::pi;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
-
-constexpr double kDegree = pi / 180;
 
 // Camera axes are ECI's: the target stands along z.
 MeshPose at(const Vec3& r_TC, const Mat3& R_TI = {}) {

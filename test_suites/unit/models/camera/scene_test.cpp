@@ -10,15 +10,16 @@
 #include <numbers>
 #include <numeric>
 
+#include "angles.hpp"
+
 namespace orrery {
 namespace {
 
 using std::numbers::pi;
 
-constexpr double kDegree = pi / 180;
 const Vec3 kSunAlongX{kAstronomicalUnit_m, 0, 0};
 
-double sum(const ElectronImage& image) {
+double total_of(const ElectronImage& image) {
   return std::accumulate(image.values.begin(), image.values.end(), 0.0);
 }
 
@@ -80,7 +81,8 @@ TEST(EarthViewTest, FluxOfTheWholeDiscIsALambertSpheres) {
                          .sun = 1.03};
     Image<float> suns(256, 256), covered(256, 256);
     earth.add(suns, covered, rays, pose);
-    EXPECT_NEAR(sum(suns) / lambert_sphere_suns(6378137, 0.5, d, p, 1.03), 1, 0.015) << phase_deg;
+    EXPECT_NEAR(total_of(suns) / lambert_sphere_suns(6378137, 0.5, d, p, 1.03), 1, 0.015)
+        << phase_deg;
   }
 }
 
@@ -128,7 +130,8 @@ TEST(EarthSurfaceTest, MapsOfXplanetLieTheRightWay) {
     GTEST_SKIP() << error.what();
   }
   const auto at = [&](double longitude_deg, double latitude_deg) {
-    return map.at(float(longitude_deg * kDegree), float(latitude_deg * kDegree));
+    const double a = longitude_deg * kDegree, b = latitude_deg * kDegree;
+    return map.at({std::cos(a) * std::cos(b), std::sin(a) * std::cos(b), std::sin(b)});
   };
   const float sahara = at(10, 23).albedo, atlantic = at(-30, 5).albedo,
               pacific = at(-140, -20).albedo;
@@ -163,7 +166,7 @@ TEST(SceneTest, FarTargetIsAPointOfItsMagnitude) {
   EXPECT_NEAR(-2.5 * std::log10(electrons / Optics().electrons_ps(0)), 4.7, 0.05);
   const double closed = lambert_sphere_suns(0.15, 0.3, 100e3, 60 * kDegree, 1);
   EXPECT_NEAR(electrons / Optics().electrons_ps_of_suns(closed), 1, 0.01);
-  EXPECT_NEAR(sum(frame.light) / electrons, 1, 1e-3);
+  EXPECT_NEAR(total_of(frame.light) / electrons, 1, 1e-3);
 }
 
 // The image's sum times d^2 over the change from point to mesh, at 2 R f/d = 1 px: no jump. The
@@ -182,8 +185,8 @@ TEST(SceneTest, FluxDoesNotJumpWhenThePointBecomesAMesh) {
                       .v_ECI = state.camera.v_ECI,
                       .R_TI = rotation_by({0.5, 0.2, 0.9})}};
     const SceneFrame frame = scene.render(state, {.duration_s = 1});
-    scaled.push_back(sum(frame.light) * d * d);
-    EXPECT_NEAR(sum(frame.light) / frame.targets[0]->electrons, 1, 1e-4) << size_px;
+    scaled.push_back(total_of(frame.light) * d * d);
+    EXPECT_NEAR(total_of(frame.light) / frame.targets[0]->electrons, 1, 1e-4) << size_px;
   }
   for (const double value : scaled) EXPECT_NEAR(value / scaled[0], 1, 0.004);
   EXPECT_NEAR(scaled[4] / scaled[3], 1, 0.002);
@@ -232,7 +235,7 @@ TEST(SceneTest, MoonAndSunHaveTheirMagnitudes) {
   state.r_moon_ECI = moon;
   const auto flux_towards = [&](const Vec3& direction) {
     state.camera.R_CI = looking_along(direction);
-    return sum(scene.render(state, {.duration_s = 1}).light);
+    return total_of(scene.render(state, {.duration_s = 1}).light);
   };
   const double moon_expected = Optics().electrons_ps(moon_magnitude(moon, sun, state.camera.r_ECI));
   EXPECT_NEAR(flux_towards(moon) / moon_expected, 1, 0.01);
@@ -291,7 +294,7 @@ TEST(SceneTest, PixelsDoNotDependOnTheThreads) {
   state.camera.omega_CI_C = {0.01, 0.02, 0};
   state.targets = {{.r_ECI = state.camera.r_ECI + Vec3{9, 1, 0}, .v_ECI = state.camera.v_ECI}};
   const SceneFrame one = scene.render(state, {.duration_s = 0.2}, 1);
-  EXPECT_GT(sum(one.light), 0);
+  EXPECT_GT(total_of(one.light), 0);
   for (const int threads : {2, 3, 7}) {
     EXPECT_EQ(scene.render(state, {.duration_s = 0.2}, threads).light, one.light);
   }

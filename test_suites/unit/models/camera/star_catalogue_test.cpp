@@ -9,13 +9,14 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "angles.hpp"
+
 namespace orrery {
 namespace {
 
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-constexpr double kDegree = std::numbers::pi / 180, kArcsecond = kDegree / 3600;
 const std::filesystem::path kStars = std::filesystem::path(ORRERY_REFERENCE_DATA) / "stars";
 
 double angle_rad(const Vec3& a, const Vec3& b) {

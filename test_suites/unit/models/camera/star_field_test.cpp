@@ -7,12 +7,11 @@
 #include <numeric>
 #include <vector>
 
+#include "angles.hpp"
 #include "opencv_projection.hpp"
 
 namespace orrery {
 namespace {
-
-constexpr double kDegree = 3.14159265358979323846 / 180;
 
 PinholeOptions star_tracker() {
   return {.width_px = 512,
