@@ -8,23 +8,13 @@
 
 #include "orrery_flight_library.h"
 
-enum { kMostLoads = 256 }; /* of slots, in one call */
-
 static struct {
   void *library, *self;
   const orrery_flight* flight;
+  FILE* loads; /* the recording, from where the last call ended: its lines "slot" are read here */
   int64_t tick_at;
   int asked_for_tick, ending; /* within destroy, which may only log */
-  char* loads[kMostLoads];    /* lines "slot": what the loads of the next call find, in order */
-  int load_count, loaded;
 } host;
-
-static void print_hex(const void* data, uint32_t bytes) {
-  const unsigned char* byte = data;
-  if (bytes == 0) putchar('-');
-  for (; bytes > 0; --bytes) printf("%02x", *byte++);
-  putchar('\n');
-}
 
 /* Aligned to 8 bytes and never null, as inputs are. The caller frees it. */
 static unsigned char* from_hex(const char* text, uint32_t* bytes) {
@@ -37,17 +27,17 @@ static unsigned char* from_hex(const char* text, uint32_t* bytes) {
 }
 
 static int32_t output(void* context, uint32_t port, const void* data, uint32_t bytes) {
-  uint32_t i;
+  const orrery_port* to = host.flight->ports;
+  const orrery_port* const end = to + host.flight->port_count;
   (void)context;
   if (host.ending) return ORRERY_REJECTED;
-  for (i = 0; i < host.flight->port_count; ++i) {
-    if (host.flight->ports[i].direction != ORRERY_OUT || host.flight->ports[i].id != port) continue;
-    if (bytes > host.flight->ports[i].max_bytes) return ORRERY_TOO_SMALL;
-    printf("> out %" PRIu32 " ", port);
-    print_hex(data, bytes);
-    return ORRERY_OK;
-  }
-  return ORRERY_NOT_FOUND;
+  while (to != end && (to->direction != ORRERY_OUT || to->id != port)) ++to;
+  if (to == end) return ORRERY_NOT_FOUND;
+  if (bytes > to->max_bytes) return ORRERY_TOO_SMALL;
+  printf("> out %" PRIu32 " %s", port, bytes == 0 ? "-" : "");
+  for (uint32_t i = 0; i < bytes; ++i) printf("%02x", ((const unsigned char*)data)[i]);
+  putchar('\n');
+  return ORRERY_OK;
 }
 
 static void request_tick(void* context, int64_t at_ns) {
@@ -62,19 +52,23 @@ static void log_line(void* context, int32_t level, const char* line) {
 }
 
 static int32_t nv_load(void* context, uint32_t number, void* buffer, uint32_t capacity) {
-  uint32_t recorded = 0, bytes = 0;
+  static char* line;
+  static size_t size;
+  uint32_t recorded, bytes;
   unsigned char* data;
-  int at = 0, fits;
+  int at = 0;
   (void)context;
-  if (host.loaded == host.load_count) return ORRERY_NOT_FOUND;
-  sscanf(host.loads[host.loaded], "slot %" SCNu32 " %n", &recorded, &at);
-  if (recorded != number) return ORRERY_NOT_FOUND; /* it asks for what it did not ask for then */
-  if (strncmp(host.loads[host.loaded++] + at, "none", 4) == 0) return ORRERY_NOT_FOUND;
-  data = from_hex(host.loads[host.loaded - 1] + at, &bytes);
-  fits = bytes <= capacity;
-  if (fits) memcpy(buffer, data, bytes);
+  do {
+    if (getline(&line, &size, host.loads) <= 0) return ORRERY_NOT_FOUND;
+  } while (line[0] == '>');
+  if (sscanf(line, "slot %" SCNu32 " %n", &recorded, &at) != 1 || recorded != number ||
+      strncmp(line + at, "none", 4) == 0) {
+    return ORRERY_NOT_FOUND; /* as then, or it did not ask for this one then */
+  }
+  data = from_hex(line + at, &bytes);
+  if (bytes <= capacity) memcpy(buffer, data, bytes);
   free(data);
-  return fits ? (int32_t)bytes : ORRERY_TOO_SMALL;
+  return bytes <= capacity ? (int32_t)bytes : ORRERY_TOO_SMALL;
 }
 
 /* What was stored shows in the recording, where it is loaded. */
@@ -131,29 +125,24 @@ static int32_t call(const char* path, const char* line) {
 
 int main(int argc, char** argv) {
   char* line = NULL;
-  size_t capacity = 0;
+  size_t size = 0;
   FILE* recording = argc == 3 ? fopen(argv[2], "r") : NULL;
+  host.loads = argc == 3 ? fopen(argv[2], "r") : NULL;
   if (argc != 3) fail("usage", PROGRAM " LIBRARY.so RECORDING > REPLAY");
-  if (recording == NULL) fail("cannot read", argv[2]);
-  while (getline(&line, &capacity, recording) > 0) {
+  if (recording == NULL || host.loads == NULL) fail("cannot read", argv[2]);
+  while (getline(&line, &size, recording) > 0) {
     int32_t status;
     if (line[0] == '>') continue; /* an answer: ours is printed instead */
     fputs(line, stdout);
     fflush(stdout); /* a call that crashed crashes here, too, and is the last line */
-    if (strncmp(line, "orrery-calls 1 ", 15) == 0) continue;
-    if (strncmp(line, "slot ", 5) == 0) {
-      if (host.load_count == kMostLoads) fail("more loads in a call than this host holds", line);
-      host.loads[host.load_count++] = strdup(line);
-      continue;
+    if (strncmp(line, "slot ", 5) == 0) continue;
+    if (strncmp(line, "orrery-calls 1 ", 15) != 0) {
+      host.asked_for_tick = 0;
+      status = call(argv[1], line);
+      if (host.asked_for_tick) printf("> tick %" PRId64 "\n", host.tick_at);
+      printf("> status %" PRId32 "\n", status);
     }
-    host.asked_for_tick = 0;
-    status = call(argv[1], line);
-    if (host.asked_for_tick) printf("> tick %" PRId64 "\n", host.tick_at);
-    printf("> status %" PRId32 "\n", status);
-    while (host.load_count > 0) free(host.loads[--host.load_count]);
-    host.loaded = 0;
+    fseek(host.loads, ftell(recording), SEEK_SET);
   }
-  free(line);
-  fclose(recording);
   return 0;
 }
