@@ -39,16 +39,20 @@ TEST(ChildProcess, StartsWhileAnotherThreadIsInAHook) {
   char byte = 0;
   EXPECT_EQ(read(begun[0], &byte, 1), 1);
   std::atomic<pid_t> id = 0;
-  std::thread in_hook([&id] {
+  std::atomic<bool> is_through = false;
+  std::thread in_hook([&] {
     id = gettid();
     EXPECT_EQ(dup2(-1, -1), -1);
+    is_through = true;
   });
-  while (id == 0 || !sleeps(id)) std::this_thread::yield();
+  while (!is_through && (id == 0 || !sleeps(id))) std::this_thread::yield();
+  const bool looks_up = !is_through;
 
-  EXPECT_EQ(run_child(command).exit_code, 0);
+  if (looks_up) EXPECT_EQ(run_child(command).exit_code, 0);
   EXPECT_EQ(write(may_end[1], &byte, 1), 1);
   in_hook.join();
   loader.join();
+  if (!looks_up) GTEST_SKIP() << "a test before this one called dup2: run it alone, as ctest does";
 }
 
 }  // namespace
