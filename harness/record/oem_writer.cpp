@@ -61,13 +61,28 @@ OemWriter::OemWriter(const std::filesystem::path& path, const OemObject& object,
 
 void OemWriter::state(SimTime t, const Components& r_ECI, const Components& v_ECI) {
   check(t, r_ECI, v_ECI);
-  if (!in_segment_) begin_segment(t);
-  line_ = to_calendar(t);
-  append_components(line_, r_ECI, kPositionDecimals);
-  append_components(line_, v_ECI, kVelocityDecimals);
+  if (!in_segment_) begin_segment(after_break_ ? after_break_->t : t);
+  if (after_break_ && after_break_->t < t) write(*after_break_);
+  after_break_.reset();
+  write({t, r_ECI, v_ECI});
+}
+
+void OemWriter::break_segment(SimTime t, const Components& r_ECI, const Components& v_before_ECI,
+                              const Components& v_after_ECI) {
+  const bool is_open = in_segment_ ? *last_ < t : after_break_ && after_break_->t < t;
+  if (is_open) state(t, r_ECI, v_before_ECI);
+  check(t, r_ECI, v_after_ECI, true);
+  in_segment_ = false;
+  after_break_ = {t, r_ECI, v_after_ECI};
+}
+
+void OemWriter::write(const State& state) {
+  line_ = to_calendar(state.t);
+  append_components(line_, state.r_ECI, kPositionDecimals);
+  append_components(line_, state.v_ECI, kVelocityDecimals);
   line_ += '\n';
   file_.write(line_);
-  last_ = t;
+  last_ = state.t;
 }
 
 void OemWriter::close() {
@@ -94,13 +109,15 @@ void OemWriter::end_segment() {
   file_.overwrite(stop_time_position_, to_calendar(*last_));
 }
 
-void OemWriter::check(SimTime t, const Components& r_ECI, const Components& v_ECI) const {
+void OemWriter::check(SimTime t, const Components& r_ECI, const Components& v_ECI,
+                      bool is_break) const {
   check_components("r_ECI", r_ECI, kLargestPosition_m, "99999 km", t);
   check_components("v_ECI", v_ECI, kLargestVelocity_mps, "99 km/s", t);
-  const bool in_order = !last_ || (in_segment_ ? t > *last_ : t >= *last_);
-  if (!in_order) {
+  const std::optional<SimTime> last = after_break_ ? after_break_->t : last_;
+  const bool may_share = is_break || !in_segment_;
+  if (last && (may_share ? t < *last : t <= *last)) {
     throw std::invalid_argument("OemWriter::state: t = " + to_string(t) +
-                                " does not follow the last state, " + to_string(*last_));
+                                " does not follow the last state, " + to_string(*last));
   }
 }
 

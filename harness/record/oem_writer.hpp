@@ -35,12 +35,15 @@ class OemWriter {
 
   /// Adds a state, metres and m/s.
   /// @throws std::invalid_argument  a component not finite, or above 99999 km or 99 km/s; t not
-  ///                                after the last state of this segment.
+  ///                                after the last state of this segment, or before a break.
   void state(SimTime t, const Components& r_ECI, const Components& v_ECI);
 
-  /// The next state begins a segment of its own, and may have the time of the last one. For
-  /// impulses: a reader must not interpolate across one.
-  void break_segment() { in_segment_ = false; }
+  /// Ends the segment with the state before `t` and begins one with that after it: for impulses,
+  /// and where thrust begins or ends, since a reader must not interpolate across either. No instant
+  /// is left without a segment. A break at which the message would begin or end adds no state.
+  /// @throws  as state(); t may be that of the last state, or of the last break.
+  void break_segment(SimTime t, const Components& r_ECI, const Components& v_before_ECI,
+                     const Components& v_after_ECI);
 
   /// @throws std::logic_error    no state was written: an OEM without one is not valid.
   ///         std::runtime_error  the rest cannot be written.
@@ -50,15 +53,22 @@ class OemWriter {
   void continue_in(std::filesystem::path path) { file_.continue_in(std::move(path)); }
 
  private:
+  struct State {
+    SimTime t;
+    Components r_ECI, v_ECI;
+  };
+  void write(const State& state);
   void begin_segment(SimTime t);
   void end_segment();
-  void check(SimTime t, const Components& r_ECI, const Components& v_ECI) const;
+  void check(SimTime t, const Components& r_ECI, const Components& v_ECI,
+             bool is_break = false) const;
 
   OutputFile file_;
   OemObject object_;
   std::string line_;  // kept, so that a state costs no allocation
   bool in_segment_ = false;
   std::optional<SimTime> last_;           // time of the last state written
+  std::optional<State> after_break_;      // begins the next segment, with the state that follows it
   std::uint64_t stop_time_position_ = 0;  // of the last segment's STOP_TIME in the file
 };
 

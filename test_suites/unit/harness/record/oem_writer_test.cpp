@@ -108,26 +108,27 @@ TEST_F(OemWriterTest, FileIsThatOfTheStandardToTheByte) {
   oem.state(epoch, r, v);
   oem.state(epoch + 10s + 1ns, {-r[0], r[1], r[2]}, v);
   oem.close();
-  EXPECT_EQ(content_of(path),
-            "CCSDS_OEM_VERS = 2.0\n"
-            "COMMENT Simulated. CREATION_DATE is the start of the run, so that equal runs give equal\n"
-            "COMMENT files.\n"
-            "CREATION_DATE = 2025-03-20T00:00:00.000000000\n"
-            "ORIGINATOR = ORRERY\n"
-            "\n"
-            "META_START\n"
-            "OBJECT_NAME = dsc\n"
-            "OBJECT_ID = 2025-001A\n"
-            "CENTER_NAME = EARTH\n"
-            "REF_FRAME = EME2000\n"
-            "TIME_SYSTEM = GPS\n"
-            "START_TIME = 2025-03-20T00:00:00.000000000\n"
-            "STOP_TIME = 2025-03-20T00:00:10.000000001\n"
-            "META_STOP\n"
-            "2025-03-20T00:00:00.000000000 6928.1370000000 -0.0012500000 0.0000000000"
-            " 0.0000000000000 7.5851234567890 -0.0000000000010\n"
-            "2025-03-20T00:00:10.000000001 -6928.1370000000 -0.0012500000 0.0000000000"
-            " 0.0000000000000 7.5851234567890 -0.0000000000010\n");
+  EXPECT_EQ(
+      content_of(path),
+      "CCSDS_OEM_VERS = 2.0\n"
+      "COMMENT Simulated. CREATION_DATE is the start of the run, so that equal runs give equal\n"
+      "COMMENT files.\n"
+      "CREATION_DATE = 2025-03-20T00:00:00.000000000\n"
+      "ORIGINATOR = ORRERY\n"
+      "\n"
+      "META_START\n"
+      "OBJECT_NAME = dsc\n"
+      "OBJECT_ID = 2025-001A\n"
+      "CENTER_NAME = EARTH\n"
+      "REF_FRAME = EME2000\n"
+      "TIME_SYSTEM = GPS\n"
+      "START_TIME = 2025-03-20T00:00:00.000000000\n"
+      "STOP_TIME = 2025-03-20T00:00:10.000000001\n"
+      "META_STOP\n"
+      "2025-03-20T00:00:00.000000000 6928.1370000000 -0.0012500000 0.0000000000"
+      " 0.0000000000000 7.5851234567890 -0.0000000000010\n"
+      "2025-03-20T00:00:10.000000001 -6928.1370000000 -0.0012500000 0.0000000000"
+      " 0.0000000000000 7.5851234567890 -0.0000000000010\n");
 }
 
 // The last decimals are 0.1 um and 0.1 nm/s: half of them is lost at most.
@@ -218,33 +219,49 @@ TEST_F(OemWriterTest, KeywordsAreThoseOfConformantSamples) {
   EXPECT_EQ(as_set(ours.segments[0].metadata), in_all_segments);
 }
 
-TEST_F(OemWriterTest, BreakBeginsASegmentThatMayShareTheInstant) {
+// A thruster of 20 ms at 7 s and an impulse at 15 s, sampled every 5 s: each instant from the first
+// state to the last lies in a segment, and segments meet where the velocity may jump.
+TEST_F(OemWriterTest, BreaksLeaveNoInstantWithoutASegment) {
+  const OemWriter::Components after{0, 7586, 0};
   OemWriter oem(path, object, epoch);
+  oem.break_segment(epoch, r, v, v);  // where it begins
   oem.state(epoch, r, v);
   oem.state(epoch + 5s, r, v);
-  oem.break_segment();
-  oem.state(epoch + 5s, r, {0, 7586, 0});  // after an impulse
-  oem.state(epoch + 9s, r, v);
+  oem.break_segment(epoch + 7s, r, v, v);
+  oem.break_segment(epoch + 7s, r, v, v);  // a second nozzle
+  oem.break_segment(epoch + 7s + 20ms, r, v, v);
+  oem.state(epoch + 10s, r, v);
+  oem.break_segment(epoch + 15s, r, v, after);
+  oem.state(epoch + 15s, r, after);
+  oem.state(epoch + 20s, r, v);
+  oem.break_segment(epoch + 20s, r, v, after);  // where it ends
   oem.close();
   const Oem read = read_oem(content_of(path));
-  ASSERT_EQ(read.segments.size(), 2u);
-  const auto spans = [](const Oem::Segment& segment) {
-    return std::pair(segment.metadata[5].second, segment.metadata[6].second);
-  };
-  EXPECT_EQ(spans(read.segments[0]), std::pair(std::string("2025-03-20T00:00:00.000000000"),
-                                               std::string("2025-03-20T00:00:05.000000000")));
-  EXPECT_EQ(spans(read.segments[1]), std::pair(std::string("2025-03-20T00:00:05.000000000"),
-                                               std::string("2025-03-20T00:00:09.000000000")));
-  EXPECT_EQ(read.segments[0].states.size(), 2u);
-  EXPECT_EQ(read.segments[1].states.size(), 2u);
+  using Span = std::vector<std::string>;
+  std::vector<Span> spans, states;
+  for (const Oem::Segment& segment : read.segments) {
+    const auto seconds = [](const std::string& calendar) { return calendar.substr(17, 5); };
+    spans.push_back({seconds(segment.metadata[5].second), seconds(segment.metadata[6].second)});
+    states.emplace_back();
+    for (const Oem::State& state : segment.states) states.back().push_back(seconds(state.epoch));
+  }
+  EXPECT_THAT(spans, testing::ElementsAre(Span{"00.00", "07.00"}, Span{"07.00", "07.02"},
+                                          Span{"07.02", "15.00"}, Span{"15.00", "20.00"}));
+  EXPECT_THAT(states,
+              testing::ElementsAre(Span{"00.00", "05.00", "07.00"}, Span{"07.00", "07.02"},
+                                   Span{"07.02", "10.00", "15.00"}, Span{"15.00", "20.00"}));
+  EXPECT_NEAR(1e3 * read.segments[2].states[2].values[4], v[1], 1e-9);
+  EXPECT_NEAR(1e3 * read.segments[3].states[0].values[4], after[1], 1e-9);
 }
 
 TEST_F(OemWriterTest, StatesOutOfOrderAreRefused) {
   OemWriter oem(path, object, epoch);
   oem.state(epoch + 5s, r, v);
   EXPECT_THROW(oem.state(epoch + 5s, r, v), std::invalid_argument);
-  oem.break_segment();
-  EXPECT_THROW(oem.state(epoch + 4s, r, v), std::invalid_argument);
+  EXPECT_THROW(oem.break_segment(epoch + 4s, r, v, v), std::invalid_argument);
+  oem.break_segment(epoch + 6s, r, v, v);
+  EXPECT_THROW(oem.state(epoch + 5s, r, v), std::invalid_argument);
+  EXPECT_THROW(oem.break_segment(epoch + 5s, r, v, v), std::invalid_argument);
 }
 
 TEST_F(OemWriterTest, StatesThatNoOrbitHasAreRefusedWithTimeAndRange) {

@@ -17,9 +17,7 @@ TEST(RecordedOemTest, SpacecraftMayStartFromIt) {
   const OemWriter::Components r{6928137.123456789, -1.0, 1e-9}, v{0.1, 7585.123456789, -1e-3};
   OemWriter writer(path, {.name = "chief", .id = ""}, start);
   writer.state(start, r, v);
-  writer.state(start + 10s, r, v);
-  writer.break_segment();
-  writer.state(start + 10s, r, {0.2, 7585.0, 0.0});
+  writer.break_segment(start + 10s, r, v, {0.2, 7585.0, 0.0});
   writer.state(start + 20s, r, v);
   writer.close();
 
