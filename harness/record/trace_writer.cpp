@@ -72,9 +72,7 @@ void TraceWriter::begin(Track track, SimTime t, std::string_view name, const Jso
   move_to(t);
   require(track, Holds::kSlices);
   end(track, t);
-  open_event('B', track, t, name);
-  end_event(args);
-  open_.push_back({SimTime::max(), begun_++, track, std::string(name)});
+  open_.push_back({t, SimTime::max(), begun_++, track, std::string(name), args.members()});
 }
 
 void TraceWriter::end(Track track, SimTime t) {
@@ -87,9 +85,19 @@ void TraceWriter::end(Track track, SimTime t) {
   write_end(one, t);
 }
 
+void TraceWriter::write_begins() {
+  for (Open& one : open_) {
+    if (one.is_written) continue;
+    open_event('B', one.track, one.from, one.name);
+    end_event(one.args);
+    one.is_written = true;
+  }
+}
+
 void TraceWriter::write_end(const Open& one, SimTime t) {
-  open_event('E', one.track, t, one.name);
-  end_event({});
+  open_event(one.is_written ? 'E' : 'X', one.track, t, one.name);
+  if (!one.is_written) line_ += ",\"dur\":0";
+  end_event(one.is_written ? std::string_view() : one.args);
 }
 
 void TraceWriter::counter(Track track, SimTime t, std::string_view name, const JsonObject& values) {
@@ -102,20 +110,18 @@ void TraceWriter::flow_start(Track track, SimTime t, std::string_view name, std:
   move_to(t);
   open_event('s', track, t, name);
   line_ += ",\"cat\":\"message\",\"id\":" + std::to_string(id);
-  end_event({});
+  end_event(std::string_view());
 }
 
 void TraceWriter::flow_end(Track track, SimTime t, std::string_view name, std::uint64_t id) {
   move_to(t);
   open_event('f', track, t, name);
   line_ += ",\"cat\":\"message\",\"bp\":\"e\",\"id\":" + std::to_string(id);
-  end_event({});
+  end_event(std::string_view());
 }
 
 void TraceWriter::close(SimTime t) {
   move_to(t);
-  std::sort(open_.begin(), open_.end(),
-            [](const Open& a, const Open& b) { return a.number < b.number; });
   for (const Open& one : open_) write_end(one, t);
   open_.clear();
   file_.write("\n]}\n");
@@ -137,6 +143,7 @@ void TraceWriter::move_to(SimTime t) {
     throw std::logic_error("TraceWriter: " + to_string(t - start_) + " comes after " +
                            to_string(last_ - start_));
   }
+  if (t > last_) write_begins();
   while (!open_.empty()) {
     const auto due = std::min_element(open_.begin(), open_.end(), [](const Open& a, const Open& b) {
       return std::pair(a.until, a.number) < std::pair(b.until, b.number);
@@ -175,10 +182,10 @@ void TraceWriter::append_ts(SimTime t) {
   line_ += static_cast<char>('0' + part % 10);
 }
 
-void TraceWriter::end_event(const JsonObject& args) {
+void TraceWriter::end_event(std::string_view args) {
   if (!args.empty()) {
     line_ += ",\"args\":{";
-    line_ += args.members();
+    line_ += args;
     line_ += '}';
   }
   line_ += '}';

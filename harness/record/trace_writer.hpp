@@ -23,7 +23,8 @@ namespace orrery {
 /// Tracks  pid: a spacecraft, tid: a process or device of it, both named by metadata (M).
 /// Slices  B and E where something takes time, since a reset may cut it short; one at a time on a
 ///         track. Both have the name, which some readers want of an end, too. X without duration
-///         where it takes none.
+///         where it takes none: Perfetto reads an E before the B of the same instant, so that such
+///         a slice would have no end. A B is therefore written when time goes on.
 /// Flows   s and f of one id, each within an X of the same instant, which it binds to. Such an X
 ///         has 1 ns, the resolution, or there would be nothing to bind to, and the flow's category,
 ///         by which Chrome's DevTools find it; slices that take time could overlap it in part, so
@@ -69,7 +70,8 @@ class TraceWriter {
   void write_name(const char* what, Track track, std::string_view name);
   // Up to "name", without the closing brace.
   void open_event(char phase, Track track, SimTime t, std::string_view name);
-  void end_event(const JsonObject& args);
+  void end_event(std::string_view args);
+  void end_event(const JsonObject& args) { end_event(args.members()); }
   void move_to(SimTime t);
   void append_ts(SimTime t);
 
@@ -85,13 +87,15 @@ class TraceWriter {
   void require(Track track, Holds holds);
   std::vector<std::pair<std::string, std::vector<Thread>>> processes_;
   struct Open {
-    SimTime until;
+    SimTime from, until;
     std::uint64_t number;  // of its beginning: order among equal ends
     Track track;
-    std::string name;
+    std::string name, args;
+    bool is_written = false;  // its beginning
   };
+  void write_begins();
   void write_end(const Open& one, SimTime t);
-  std::vector<Open> open_;  // one per track at most
+  std::vector<Open> open_;  // one per track at most, in the order of their beginnings
   std::uint64_t begun_ = 0;
 };
 

@@ -31,9 +31,9 @@ class TraceRules {
     auto& open = open_[track_];
     while (!open.empty() && open.back().end >= 0 && open.back().end <= ts) open.pop_back();
     if (phase == "B") {
-      open.push_back({-1, event.value("cat", "")});
+      open.push_back({-1, event.value("cat", ""), ts});
     } else if (phase == "E") {
-      end(open, event);
+      end(open, ts, event);
     } else if (phase == "X") {
       complete(open, ts, event);
     } else if (phase == "s" || phase == "f") {
@@ -62,6 +62,7 @@ class TraceRules {
   struct Open {
     long long end;  // -1: a B
     std::string category = {};
+    long long begin = 0;  // of a B
   };
 
   void require(bool ok, const char* what, const nlohmann::json& event) {
@@ -78,10 +79,12 @@ class TraceRules {
               "named twice", event);
     }
   }
-  void end(std::vector<Open>& open, const nlohmann::json& event) {
+  void end(std::vector<Open>& open, long long ts, const nlohmann::json& event) {
     const auto begun =
         std::find_if(open.rbegin(), open.rend(), [](const Open& one) { return one.end < 0; });
     require(begun == open.rbegin() && begun != open.rend(), "an end out of turn", event);
+    // Perfetto puts ends before beginnings of the same instant: this one would never end.
+    require(begun == open.rend() || begun->begin < ts, "an end at the instant of its begin", event);
     if (begun != open.rend()) open.erase(std::next(begun).base());
   }
   void complete(std::vector<Open>& open, long long ts, const nlohmann::json& event) {

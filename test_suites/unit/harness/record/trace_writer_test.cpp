@@ -81,6 +81,23 @@ TEST_F(TraceWriterTest, AnotherSliceOrAnEndCutsTheOpenOne) {
   EXPECT_EQ(ends, (std::vector<double>{3e6, 5e6, 6e6}));
 }
 
+// A call at the very end, a burn that is over at once, and a call that a reset ends where it began.
+TEST_F(TraceWriterTest, WhatEndsWhereItBeganIsOneEvent) {
+  trace.begin(burns, start + 1s, "burn", JsonObject().add("nozzle", "+X"));
+  trace.end(burns, start + 1s);
+  trace.slice(gnc, start + 2s, 1s, "call");
+  trace.begin(gnc, start + 2s, "off");
+  trace.slice(gnc, start + 3s, 1s, "last");
+  const auto all = events(start + 3s);
+  std::vector<std::string> shown;
+  for (std::size_t i = 6; i < all.size(); ++i) {
+    shown.push_back(all[i]["ph"].get<std::string>() + " " + all[i]["name"].get<std::string>());
+  }
+  EXPECT_EQ(shown, (std::vector<std::string>{"X burn", "X call", "B off", "E off", "X last"}));
+  EXPECT_EQ(all[6]["args"]["nozzle"], "+X");
+  EXPECT_EQ(all[6]["dur"], 0);
+}
+
 TEST_F(TraceWriterTest, CloseEndsWhatIsOpen) {
   trace.slice(gnc, start, 1h, "long");
   trace.begin(radio, start + 1s, "for ever");
@@ -168,6 +185,10 @@ TEST(TraceRulesTest, FindWhatIsWrong) {
             1u);
   EXPECT_EQ(with_names(R"(,{"ph":"B","pid":1,"tid":1,"ts":2,"name":"a"})"), 1u);
   EXPECT_EQ(with_names(R"(,{"ph":"E","pid":1,"tid":1,"ts":2,"name":"a"})"), 1u);
+  // An end that Perfetto would read before its begin.
+  EXPECT_EQ(with_names(R"(,{"ph":"B","pid":1,"tid":1,"ts":2,"name":"a"},
+                           {"ph":"E","pid":1,"tid":1,"ts":2,"name":"a"})"),
+            1u);
   // An X across the end of the slice that it began in.
   EXPECT_EQ(with_names(R"(,{"ph":"B","pid":1,"tid":1,"ts":2,"name":"a"},
                            {"ph":"X","pid":1,"tid":1,"ts":3,"dur":2,"name":"b"},
