@@ -343,7 +343,7 @@ class TimeChart {
   }
   band(g, width, yOf) {
     const s = this.sigma;
-    g.globalAlpha = 0.28; g.fillStyle = css("--band");
+    g.globalAlpha = 0.45; g.fillStyle = css("--band");
     g.beginPath();
     s.t.forEach((t, i) => g.lineTo(xOf(t, width), yOf(s.hi[i])));
     for (let i = s.t.length - 1; i >= 0; --i) g.lineTo(xOf(s.t[i], width), yOf(-s.hi[i]));
