@@ -1,6 +1,6 @@
-// What recording costs: 20 h of two spacecraft that fly formation_keeping, truth at 1 Hz and all
-// files, against the same run with --orrery_record=off in effect. The two alternate, so that a
-// machine that others use slows both. A recorder has a thread of its own (call_queue.hpp).
+// What recording costs: 20 h of two spacecraft, truth at 1 Hz and all files, against the same run
+// with --orrery_record=off in effect. The two alternate, so that a machine that others use slows
+// both. A recorder has a thread of its own (call_queue.hpp).
 #include <orrery/fixtures/recorder.hpp>
 #include <orrery/orrery.hpp>
 
@@ -11,6 +11,8 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+
+#include "transfer.hpp"
 
 namespace orrery {
 namespace {
@@ -38,21 +40,39 @@ struct Cost {
   }
 };
 
-// From construction to destruction: the report and the index are part of it.
-Cost fly(bool record, Duration span, Duration receiver_period) {
-  const Cost begin = Cost::now();
+enum Run : std::int64_t {
+  kTransferRun,      // the case study's transfer: both fly formation_gnc
+  kFirstFlight,      // formation_keeping on both, receivers that say where they are every 10 s
+  kAllMeasurements,  // the same with receivers that give all measurements at 1 Hz
+  kCoast,            // no flight software: orbits and receivers alone
+};
+
+const char* name_of(std::int64_t run) {
+  constexpr const char* kNames[] = {"transfer", "first flight", "all measurements", "coast"};
+  return kNames[run];
+}
+
+FormationOptions options_of(std::int64_t run, bool record) {
+  if (run == kTransferRun) return bench::telescope(record);
   FormationOptions options;
-  options.flight.library = "formation_keeping";
+  if (run != kCoast) options.flight.library = "formation_keeping";
   options.world.record = record;
+  options = missions::first_flight(options);
+  if (run == kAllMeasurements) {
+    using novatel::LogTrigger;
+    options.gnss.period = 1s;
+    options.gnss.logs = {{novatel::kRangeId, LogTrigger::kOnTime, 1s},
+                         {novatel::kBestXyzId, LogTrigger::kOnTime, 1s}};
+  }
+  return options;
+}
+
+// From construction to destruction: the report and the index are part of it.
+Cost fly(std::int64_t run, bool record, Duration span) {
+  const Cost begin = Cost::now();
   {
-    options = missions::first_flight(options);
-    options.gnss.period = receiver_period;
-    if (receiver_period == 1s) {
-      using novatel::LogTrigger;
-      options.gnss.logs = {{novatel::kRangeId, LogTrigger::kOnTime, receiver_period},
-                           {novatel::kBestXyzId, LogTrigger::kOnTime, receiver_period}};
-    }
-    FormationWorld world(options);
+    FormationWorld world(options_of(run, record));
+    if (run == kTransferRun) bench::command_transfer(world);
     world.run_for(span);
   }
   return Cost::now() - begin;
@@ -92,10 +112,11 @@ void BM_RecordingAtOneHertz(benchmark::State& state) {
   const ScratchFolder& out = scratch_folder();
   Cost off, on;
   for (auto _ : state) {
-    off += fly(false, state.range(0) * 1h, state.range(1) * 1s);
-    on += fly(true, state.range(0) * 1h, state.range(1) * 1s);
+    off += fly(state.range(1), false, state.range(0) * 1h);
+    on += fly(state.range(1), true, state.range(0) * 1h);
     out.clear();
   }
+  state.SetLabel(name_of(state.range(1)));
   const double runs = static_cast<double>(state.iterations());
   state.counters["off_s"] = off.cpu_s / runs;
   state.counters["on_s"] = on.cpu_s / runs;
@@ -157,17 +178,14 @@ constexpr int kHours = 1;
 #else
 constexpr int kHours = 20;
 #endif
-// Receivers that say where they are every 10 s, as the reference mission has them; and receivers
-// that give all measurements at 1 Hz.
 BENCHMARK(BM_FilesOfALongRun)
     ->ArgName("hours")
     ->Arg(5 * kHours / 2)
     ->Iterations(1)
     ->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_RecordingAtOneHertz)
-    ->ArgNames({"hours", "receiver_period_s"})
-    ->Args({kHours, 10})
-    ->Args({kHours, 1})
+    ->ArgNames({"hours", "run"})
+    ->ArgsProduct({{kHours}, {kTransferRun, kFirstFlight, kAllMeasurements, kCoast}})
     ->Unit(benchmark::kMillisecond);
 
 }  // namespace

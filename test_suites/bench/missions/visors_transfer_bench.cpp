@@ -6,35 +6,12 @@
 
 #include <ctime>
 
-#include "formation_gnc/formation_gnc_messages.h"
+#include "transfer.hpp"
 
 namespace orrery {
 namespace {
 
-constexpr Duration kTransfer = 20h, kBegin = 30min;
-
-FormationOptions telescope(std::uint64_t seed) {
-  FormationOptions options{.flight = {.library = "formation_gnc", .heap_bytes = 50_MB},
-                           .run = RunId{.seed = seed}};
-  options.world.record = false;
-  return missions::visors_like(std::move(options));
-}
-
-void command_transfer(FormationWorld& world) {
-  const std::int64_t start_ns = to_ns(world.now());
-  const formation_gnc_command c = {.opcode = FORMATION_GNC_UPLOAD,
-                                   .mode = FORMATION_GNC_TRANSFER,
-                                   .observations = 0,
-                                   .every = 0,
-                                   .number = 1,
-                                   .t_ns = start_ns + kBegin.count(),
-                                   .end_ns = start_ns + kTransfer.count(),
-                                   .a_m = 0,
-                                   .b_m = 0};
-  std::byte message[FORMATION_GNC_COMMAND_BYTES];
-  formation_gnc_put_command(reinterpret_cast<unsigned char*>(message), &c);
-  world.ground().command("dsc", at(10min), message);
-}
+using bench::kTransfer;
 
 // Harness and flight software are told apart by wall time, which a busy machine stretches alike;
 // both are given as their share of the CPU time.
@@ -42,8 +19,8 @@ void BM_VisorsTransfer(benchmark::State& state) {
   double simulated_s = 0, flight_s = 0, total_s = 0, cpu_s = 0, delta_v_mps = 0;
   for (auto _ : state) {
     state.PauseTiming();
-    auto world = std::make_unique<FormationWorld>(telescope(1));
-    command_transfer(*world);
+    auto world = std::make_unique<FormationWorld>(bench::telescope(false));
+    bench::command_transfer(*world);
     state.ResumeTiming();
     const std::clock_t begin = std::clock();
     world->run_for(kTransfer);
