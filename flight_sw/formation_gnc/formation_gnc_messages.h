@@ -14,7 +14,7 @@
  * `every`-th orbit. REMOVE  takes entry `number` out of the plan, if it is there. CLEAR   empties
  * the plan and withdraws what was announced and is not committed.
  *
- *   telemetry, 328 bytes
+ *   telemetry, 408 bytes
  *     0 u16 magic 0x5447 | 2 u8 version | 3 u8 role | 4 u32 mode | 8 i64 t_ns | 16 f64 a_roe_m[6]
  *     | 64 f64 sigma_r_m[3] | 88 f64 sigma_v_mps[3] | 112 f64 delta_v_mps | 120 i64 next_event_ns
  * (0: none) | 128 f64 minimum_separation_m | 136 u32 boot_count | 140 u32 transition | 144 u32 late
@@ -24,8 +24,8 @@
  *     | 196 f64 drag_difference_mps2 | 204 graphic | 220 sdcp: innovations since boot, each u32
  *     degrees of freedom, u32 rejected, f64 sum of squares over variances; of epochs in time
  *     | 236 integers held, 12 times: u8 prn (0: none), 40-bit two's complement cycles, of single
- *     differences deputy less chief, up to what all have in common | 308 f64 thruster_scale
- *     | 316 f64 sigma_thruster_scale | 324 u32 crc
+ *     differences deputy less chief, up to what all have in common | 308 f64 nozzle_scale[6]
+ *     | 356 f64 sigma_nozzle_scale[6] | 404 u32 crc
  *     flags: 1 navigation valid, 2 integers fixed, 4 partner heard, 8 transition pending.
  *
  *   crosslink packet, both ways
@@ -50,7 +50,7 @@
 
 #define FORMATION_GNC_VERSION 3u
 #define FORMATION_GNC_COMMAND_BYTES 48u
-#define FORMATION_GNC_TELEMETRY_BYTES 328u
+#define FORMATION_GNC_TELEMETRY_BYTES 408u
 #define FORMATION_GNC_SATELLITES 12u
 #define FORMATION_GNC_HEADER_BYTES 24u
 #define FORMATION_GNC_MEASUREMENT_BYTES (44u + 14u * FORMATION_GNC_SATELLITES)
@@ -109,7 +109,8 @@ typedef struct formation_gnc_telemetry {
   double drag_difference_mps2; /* deputy less chief, along track */
   formation_gnc_innovations graphic, sdcp;
   formation_gnc_integer integer[FORMATION_GNC_SATELLITES];
-  double thruster_scale, sigma_thruster_scale; /* delivered over commanded, as learnt so far */
+  /* of +X -X +Y -Y +Z -Z: delivered over commanded, as learnt so far */
+  double nozzle_scale[6], sigma_nozzle_scale[6];
 } formation_gnc_telemetry;
 
 typedef struct formation_gnc_header {
@@ -251,8 +252,8 @@ ORRERY_MAYBE_UNUSED static void formation_gnc_put_telemetry(unsigned char* messa
     message[236 + 6 * k] = (unsigned char)(t->integer[k].prn & 0xFFu);
     formation_gnc_put_int(message + 237 + 6 * k, 5, t->integer[k].cycles);
   }
-  orrery_put_f64(message + 308, t->thruster_scale);
-  orrery_put_f64(message + 316, t->sigma_thruster_scale);
+  orrery_put_f64s(message + 308, t->nozzle_scale, 6);
+  orrery_put_f64s(message + 356, t->sigma_nozzle_scale, 6);
   formation_gnc_seal(message, FORMATION_GNC_TELEMETRY_BYTES);
 }
 
@@ -293,8 +294,8 @@ ORRERY_MAYBE_UNUSED static int formation_gnc_get_telemetry(const unsigned char* 
     t->integer[k].prn = message[236 + 6 * k];
     t->integer[k].cycles = formation_gnc_get_int(message + 237 + 6 * k, 5);
   }
-  t->thruster_scale = orrery_get_f64(message + 308);
-  t->sigma_thruster_scale = orrery_get_f64(message + 316);
+  orrery_get_f64s(message + 308, t->nozzle_scale, 6);
+  orrery_get_f64s(message + 356, t->sigma_nozzle_scale, 6);
   return 1;
 }
 

@@ -35,36 +35,49 @@ flight_support::Vec3 dv_eci_from_rtn(const flight_support::StateEci& burning,
 flight_support::Vec3 dv_rtn_from_eci(const flight_support::StateEci& burning,
                                      const flight_support::Vec3& dv_ECI);
 
+/// What a command becomes: each component in whole on-times of its nozzle, none below half of
+/// `limits.min_mps`, that from there on.
+/// @param dv_B  Body axes.
+flight_support::Vec3 in_whole_on_times(const flight_support::Vec3& dv_B,
+                                       const ImpulseLimits& limits, const ThrusterErrors& errors);
+
 /// Covariance of a burn's execution [m^2/s^2], in the axes of `dv`: what navigation adds when the
 /// burn happens.
 flight_support::Mat3 maneuver_covariance(const flight_support::Vec3& dv,
                                          const ThrusterErrors& errors);
 
-/// Estimates the factor between commanded and delivered delta-v, a constant of the thrusters.
+/// Estimates the factors between commanded and delivered delta-v: constants of six nozzles, along
+/// the axes of the body and against them, in the order +X -X +Y -Y +Z -Z.
 ///
-/// A scalar Kalman filter on the observed delta-v along the commanded one. Shots differ by
-/// `shot_to_shot`, and an observation is as good as navigation before and after the burn.
+/// Six scalar Kalman filters, each on the component that its nozzle does. Shots differ by
+/// `shot_to_shot`, the other nozzles' misalignment adds to a component, and an observation is as
+/// good as navigation before and after the burn.
 class ThrusterScale {
  public:
+  static constexpr int kNozzles = 6;
+
   explicit ThrusterScale(const ThrusterErrors& errors = {});
 
-  /// @param observed        Delta-v that navigation saw, in the axes of `commanded`.
+  /// @param commanded_B     What the thruster was asked for [m/s], body axes.
+  /// @param observed_B      What navigation saw of it.
   /// @param observed_sigma  1-sigma per axis of that [m/s], above 0.
-  /// @return false if the observation is nothing to learn from: not finite, no burn, or more than
+  /// @return false if no component is anything to learn from: not finite, no burn, or more than
   ///         5 sigma off.
-  bool observe(const flight_support::Vec3& commanded, const flight_support::Vec3& observed,
+  bool observe(const flight_support::Vec3& commanded_B, const flight_support::Vec3& observed_B,
                double observed_sigma_mps);
 
-  double scale() const { return scale_; }  ///< delivered over commanded
-  double sigma() const;
-  /// What to command so that `wanted` is delivered.
-  flight_support::Vec3 command_for(const flight_support::Vec3& wanted) const;
-  /// The errors that remain: `scale` is replaced by sigma().
-  ThrusterErrors errors() const;
+  double scale(int nozzle) const { return scale_[nozzle]; }  ///< delivered over commanded
+  double sigma(int nozzle) const;
+  /// What to command so that `wanted_B` is delivered.
+  flight_support::Vec3 command_for(const flight_support::Vec3& wanted_B) const;
+  /// What comes of a command.
+  flight_support::Vec3 delivered(const flight_support::Vec3& commanded_B) const;
+  /// The errors that remain of a burn: `scale` is that of the nozzles that do it.
+  ThrusterErrors errors(const flight_support::Vec3& dv_B) const;
 
  private:
   ThrusterErrors errors_;
-  double scale_ = 1.0, variance_;
+  double scale_[kNozzles], variance_[kNozzles];
 };
 
 }  // namespace formation_gnc

@@ -414,7 +414,13 @@ void FormationGnc::maneuver(const FormationEstimate& estimate) {
 }
 
 void FormationGnc::command_burn(const Impulse& wanted) {
-  const Vec3 commanded = scale_.command_for(wanted.dv_ECI);
+  const Mat3 R_BI = rotation_of(attitude_at(wanted.t_ns));
+  const ManeuverOptions& options = configuration_.maneuvers;
+  // Already as the thruster will round it, so that the filters hear of what is really done.
+  const Vec3 commanded_B =
+      in_whole_on_times(scale_.command_for(R_BI * wanted.dv_ECI), options.limits, options.errors);
+  const Vec3 commanded = transpose(R_BI) * commanded_B, expected_B = scale_.delivered(commanded_B);
+  const Impulse expected{wanted.t_ns, transpose(R_BI) * expected_B};
   const double dv[3] = {commanded[0], commanded[1], commanded[2]};
   const bool accepted = out_.out_maneuver(clock_.onboard_ns(wanted.t_ns), dv);
   maneuvers_.commanded(wanted, accepted);
@@ -423,19 +429,19 @@ void FormationGnc::command_burn(const Impulse& wanted) {
     out_.log(LogLevel::kError, "the thruster refused a burn");
     return;
   }
-  const Mat3 P = maneuver_covariance(wanted.dv_ECI, scale_.errors());
+  const Mat3 P = maneuver_covariance(expected_B, scale_.errors(expected_B));
   const double sigma_mps = std::sqrt((P(0, 0) + P(1, 1) + P(2, 2)) / 3.0);
-  navigation_.maneuver(Who::kSelf, wanted.t_ns, wanted.dv_ECI, sigma_mps);
-  watch_burn(wanted);
+  navigation_.maneuver(Who::kSelf, expected.t_ns, expected.dv_ECI, sigma_mps);
+  watch_burn(expected, R_BI, commanded_B);
   Payload notice;
   ByteWriter writer(notice.data, sizeof notice.data);
   writer.u8(kManeuverNotice);
-  writer.i64(wanted.t_ns);
-  for (int k = 0; k < 3; ++k) writer.f64(wanted.dv_ECI[k]);
+  writer.i64(expected.t_ns);
+  for (int k = 0; k < 3; ++k) writer.f64(expected.dv_ECI[k]);
   writer.f64(sigma_mps);
   notice.bytes = writer.bytes();
   crosslink_.link().send(notice);  // a full window: the other's filter has to find out by itself
-  delta_v_mps_ += norm(wanted.dv_ECI);
+  delta_v_mps_ += norm(expected_B);
   ++burns_;
   unsigned char stored[12];
   orrery_put_f64(stored, delta_v_mps_);
@@ -445,12 +451,14 @@ void FormationGnc::command_burn(const Impulse& wanted) {
 
 // ---- the thruster's scale: velocity predicted with the burn, against what navigation finds later
 
-void FormationGnc::watch_burn(const Impulse& wanted) {
+void FormationGnc::watch_burn(const Impulse& expected, const Mat3& R_BI, const Vec3& commanded_B) {
   if (watched_.waiting) return;
-  watched_.look_ns = wanted.t_ns + nanoseconds(kScaleLook_s);
+  watched_.look_ns = expected.t_ns + nanoseconds(kScaleLook_s);
   const FormationEstimate predicted = navigation_.at(watched_.look_ns);
   watched_.waiting = predicted.valid;
-  watched_.commanded = wanted.dv_ECI;
+  watched_.expected = expected.dv_ECI;
+  watched_.commanded_B = commanded_B;
+  watched_.R_BI = R_BI;
   watched_.predicted_v = predicted.v_relative_ECI;
 }
 
@@ -462,8 +470,8 @@ void FormationGnc::learn_scale(std::int64_t now_ns) {
   if (!found.valid || !found.fixed) return;
   const Matrix6& P = found.relative_covariance_RTN;
   const double sigma_mps = std::sqrt((P(3, 3) + P(4, 4) + P(5, 5)) / 3.0);
-  const Vec3 observed = watched_.commanded - (found.v_relative_ECI - watched_.predicted_v);
-  scale_.observe(watched_.commanded, observed, 1.5 * sigma_mps);
+  const Vec3 observed = watched_.expected - (found.v_relative_ECI - watched_.predicted_v);
+  scale_.observe(watched_.commanded_B, watched_.R_BI * observed, 1.5 * sigma_mps);
 }
 
 // ---- what is said
@@ -551,8 +559,10 @@ void FormationGnc::send_telemetry(std::int64_t now_ns, const FormationEstimate& 
   t.graphic = graphic_.telemetry();
   t.sdcp = sdcp_.telemetry();
   fill_integers(&t);
-  t.thruster_scale = scale_.scale();
-  t.sigma_thruster_scale = scale_.sigma();
+  for (int nozzle = 0; nozzle < ThrusterScale::kNozzles; ++nozzle) {
+    t.nozzle_scale[nozzle] = scale_.scale(nozzle);
+    t.sigma_nozzle_scale[nozzle] = scale_.sigma(nozzle);
+  }
   t.flags = (estimate.valid ? 1u : 0u) | (estimate.fixed ? 2u : 0u) |
             (partner_heard_ns_ != 0 ? 4u : 0u) | (protocol.has_pending() ? 8u : 0u);
   unsigned char message[FORMATION_GNC_TELEMETRY_BYTES];

@@ -100,7 +100,9 @@ class FormationGnc {
   struct Watched {
     bool waiting = false;
     std::int64_t look_ns = 0;
-    flight_support::Vec3 commanded, predicted_v;  // ECI; of other less self
+    flight_support::Vec3 expected, predicted_v;  // ECI; the latter of other less self
+    flight_support::Vec3 commanded_B;
+    flight_support::Mat3 R_BI;  // in the middle of the burn
   };
 
   bool is_deputy() const { return configuration_.role == Role::kDeputy; }
@@ -125,7 +127,8 @@ class FormationGnc {
   void place_observation(const FormationEstimate& estimate);
   void maneuver(const FormationEstimate& estimate);
   void command_burn(const Impulse& wanted);
-  void watch_burn(const Impulse& wanted);
+  void watch_burn(const Impulse& expected, const flight_support::Mat3& R_BI,
+                  const flight_support::Vec3& commanded_B);
   void learn_scale(std::int64_t now_ns);
   void send_due(std::int64_t now_ns);
   void schedule(std::int64_t now_ns, std::int64_t now_onboard_ns);

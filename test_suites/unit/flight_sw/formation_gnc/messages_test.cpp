@@ -117,8 +117,8 @@ TEST(FormationGncMessagesTest, ACommandAndTelemetryComeBackAsTheyWere) {
   t.sdcp = {4'000'000'000u, 3, 4e9};
   t.integer[0] = {32, -500'000'000'000};
   t.integer[11] = {1, 7};
-  t.thruster_scale = 1.03;
-  t.sigma_thruster_scale = 0.004;
+  t.nozzle_scale[5] = 1.03;
+  t.sigma_nozzle_scale[0] = 0.004;
   unsigned char down[FORMATION_GNC_TELEMETRY_BYTES];
   formation_gnc_put_telemetry(down, &t);
   formation_gnc_telemetry u = {};
@@ -139,8 +139,8 @@ TEST(FormationGncMessagesTest, ACommandAndTelemetryComeBackAsTheyWere) {
   EXPECT_EQ(u.integer[0].cycles, -500'000'000'000);
   EXPECT_EQ(u.integer[11].cycles, 7);
   EXPECT_EQ(u.integer[5].prn, 0u);
-  EXPECT_EQ(u.thruster_scale, 1.03);
-  EXPECT_EQ(u.sigma_thruster_scale, 0.004);
+  EXPECT_EQ(u.nozzle_scale[5], 1.03);
+  EXPECT_EQ(u.sigma_nozzle_scale[0], 0.004);
 }
 
 // A wrong bit anywhere, a byte less or more, one of our own: rejected, and nothing has changed.
