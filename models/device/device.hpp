@@ -14,9 +14,18 @@
 #include <orrery/models/orbit/force_model.hpp>
 #include <orrery/models/orbit/thrust.hpp>
 
+#include <stdexcept>
+#include <string>
 #include <string_view>
 
 namespace orrery {
+
+/// A spacecraft as it truly is at one instant.
+struct SpacecraftState {
+  OrbitState orbit;
+  Mat3 R_BI;        // f_B = R_BI * f_ECI
+  Vec3 omega_BI_B;  // [rad/s]
+};
 
 /// What a device may see and do. One per device; it lives as long as the world.
 class DeviceContext {
@@ -37,6 +46,11 @@ class DeviceContext {
   virtual Mat3 R_BI() const = 0;
   /// Angular velocity of the body relative to ECI now, in body axes [rad/s].
   virtual Vec3 omega_BI_B() const = 0;
+  /// Another spacecraft now, for sensors that look at it. Looking changes nothing.
+  /// @throws std::invalid_argument  there is none of that name.
+  virtual SpacecraftState other(std::string_view spacecraft) const {
+    throw std::invalid_argument("DeviceContext::other: no spacecraft " + std::string(spacecraft));
+  }
   /// The device's own stream (seed, spacecraft, device, purpose). Keep the reference if you like.
   virtual RandomStream& random(std::string_view purpose) = 0;
 
@@ -71,6 +85,12 @@ class DeviceContext {
   /// that a test can say that nothing happened.
   virtual void record_event(std::string_view channel, std::string_view what) = 0;
   virtual void declare_event(std::string_view channel) = 0;
+  /// Whether the next two do anything; no record depends on it.
+  virtual bool keeps_files() const { return false; }
+  /// A file of that name in the folder of this device, beside the run's records.
+  virtual void record_file(std::string_view name, Bytes content) { (void)name, (void)content; }
+  /// A picture (PNG) for the film strip of this device in the report.
+  virtual void record_picture(std::string_view caption, Bytes png) { (void)caption, (void)png; }
   /// A message in the run's log. The levels are those of orrery_flight.h.
   virtual void log(int level, std::string_view line) = 0;
   static constexpr int kDebug = 0, kInfo = 1, kWarning = 2, kError = 3;

@@ -57,6 +57,7 @@ class FakeDeviceContext final : public DeviceContext {
   Mat3 attitude;
   Vec3 body_rate_B;
   Duration clock_offset{};  // onboard minus truth
+  std::map<std::string, SpacecraftState, std::less<>> others;
   std::map<std::string, double, std::less<>> faults;
 
   // What the device did.
@@ -67,6 +68,8 @@ class FakeDeviceContext final : public DeviceContext {
   std::vector<Sample> samples;
   std::vector<Text> texts;
   std::vector<LogLine> log_lines;
+  std::map<std::string, ByteBuffer, std::less<>> files;
+  std::vector<Text> pictures;  // their captions
 
   /// Runs timers up to and including `t`, in order of time, then of setting.
   void run_until(SimTime t) {
@@ -95,6 +98,17 @@ class FakeDeviceContext final : public DeviceContext {
   Surroundings surroundings() const override { return surroundings_at(now_); }
   Mat3 R_BI() const override { return attitude; }
   Vec3 omega_BI_B() const override { return body_rate_B; }
+  SpacecraftState other(std::string_view spacecraft) const override {
+    const auto at = others.find(spacecraft);
+    return at == others.end() ? DeviceContext::other(spacecraft) : at->second;
+  }
+  bool keeps_files() const override { return true; }
+  void record_file(std::string_view name, Bytes content) override {
+    files[std::string(name)] = ByteBuffer(content.begin(), content.end());
+  }
+  void record_picture(std::string_view caption, Bytes) override {
+    pictures.push_back({now_, "picture", std::string(caption)});
+  }
   RandomStream& random(std::string_view purpose) override {
     return streams_.stream("chief", "device", purpose);
   }
