@@ -2,9 +2,16 @@
  * struct overlay, in the manner of orrery_messages.h. Times are GPS ns since 1980-01-06.
  *
  *   command, ground -> chaser      0 u8 order (RPO_KIT_GO, _HOLD, _ABORT) | 1 u32 crc
+ *   bearing, a processor of images -> chaser: where the target is among the stars
+ *     0 i64 exposure_ns, of its middle | 8 f64 direction_ECI[3], a unit vector, geometric
+ *     | 32 f64 sigma_rad, per axis
  *   keypoints, a processor of images -> chaser
- *     0 i64 exposure_ns, of its middle | 8 u32 count, at most 32
- *     | 12 per keypoint: u32 point, f64 u px, f64 v px, f64 sigma px
+ *     0 i64 exposure_ns, of its middle | 8 f64 q_CI[4], the camera's attitude
+ *     | 40 f64 attitude_sigma_rad, per axis | 48 u32 count, at most 32
+ *     | 52 per keypoint: u32 point, f64 u px, f64 v px, f64 sigma px
+ *   target, chaser -> ground and payloads: how the target is turned
+ *     0 i64 t_ns | 8 f64 q_BI[4] | 40 f64 omega_BI_B[3] rad/s | 64 f64 sigma_rad[3], about B
+ *     | 88 u32 poses, flips, rejected, lost: of the near-range filter, since boot
  *   telemetry, chaser -> ground
  *     0 i64 t_ns | 8 u32 mode | 12 u32 waypoint | 16 f64 a_roe_m[6] | 64 f64 sigma_m[6]
  *     | 112 f64 delta_v_mps | 120 u32 burns | 124 u32 used[3]: GNSS, directions, poses
@@ -24,7 +31,11 @@
 #define RPO_KIT_TELEMETRY_BYTES 148u
 #define RPO_KIT_KEYPOINT_BYTES 28u
 #define RPO_KIT_MOST_KEYPOINTS 32u
-#define RPO_KIT_KEYPOINTS_BYTES (12u + RPO_KIT_MOST_KEYPOINTS * RPO_KIT_KEYPOINT_BYTES)
+#define RPO_KIT_KEYPOINTS_HEAD_BYTES 52u
+#define RPO_KIT_KEYPOINTS_BYTES \
+  (RPO_KIT_KEYPOINTS_HEAD_BYTES + RPO_KIT_MOST_KEYPOINTS * RPO_KIT_KEYPOINT_BYTES)
+#define RPO_KIT_BEARING_BYTES 40u
+#define RPO_KIT_TARGET_BYTES 104u
 
 enum { RPO_KIT_GO = 1, RPO_KIT_HOLD = 2, RPO_KIT_ABORT = 3 };
 
@@ -93,6 +104,113 @@ ORRERY_MAYBE_UNUSED static int rpo_kit_get_telemetry(const unsigned char* messag
   t->outliers = orrery_get_u32(message + 136);
   t->restarts = orrery_get_u32(message + 140);
   t->rejected = orrery_get_u32(message + 144);
+  return 1;
+}
+
+typedef struct rpo_kit_bearing {
+  int64_t exposure_ns;
+  double direction_ECI[3], sigma_rad;
+} rpo_kit_bearing;
+
+typedef struct rpo_kit_keypoint {
+  uint32_t point;
+  double u_px, v_px, sigma_px;
+} rpo_kit_keypoint;
+
+typedef struct rpo_kit_keypoints {
+  int64_t exposure_ns;
+  double q_CI[4], attitude_sigma_rad;
+  uint32_t count;
+  rpo_kit_keypoint seen[RPO_KIT_MOST_KEYPOINTS];
+} rpo_kit_keypoints;
+
+typedef struct rpo_kit_target {
+  int64_t t_ns;
+  double q_BI[4], omega_BI_B[3], sigma_rad[3];
+  uint32_t poses, flips, rejected, lost;
+} rpo_kit_target;
+
+ORRERY_MAYBE_UNUSED static void rpo_kit_put_bearing(unsigned char* message,
+                                                    const rpo_kit_bearing* b) {
+  orrery_put_i64(message, b->exposure_ns);
+  orrery_put_f64s(message + 8, b->direction_ECI, 3);
+  orrery_put_f64(message + 32, b->sigma_rad);
+}
+
+/* 1 if the length is right; otherwise 0, and nothing is written. */
+ORRERY_MAYBE_UNUSED static int rpo_kit_get_bearing(const unsigned char* message, uint32_t bytes,
+                                                   rpo_kit_bearing* b) {
+  if (bytes != RPO_KIT_BEARING_BYTES) return 0;
+  b->exposure_ns = orrery_get_i64(message);
+  orrery_get_f64s(message + 8, b->direction_ECI, 3);
+  b->sigma_rad = orrery_get_f64(message + 32);
+  return 1;
+}
+
+/* The length of the message. */
+ORRERY_MAYBE_UNUSED static uint32_t rpo_kit_put_keypoints(unsigned char* message,
+                                                          const rpo_kit_keypoints* k) {
+  unsigned char* at = message + RPO_KIT_KEYPOINTS_HEAD_BYTES;
+  uint32_t i;
+  orrery_put_i64(message, k->exposure_ns);
+  orrery_put_f64s(message + 8, k->q_CI, 4);
+  orrery_put_f64(message + 40, k->attitude_sigma_rad);
+  orrery_put_u32(message + 48, k->count);
+  for (i = 0; i < k->count; i++, at += RPO_KIT_KEYPOINT_BYTES) {
+    orrery_put_u32(at, k->seen[i].point);
+    orrery_put_f64(at + 4, k->seen[i].u_px);
+    orrery_put_f64(at + 12, k->seen[i].v_px);
+    orrery_put_f64(at + 20, k->seen[i].sigma_px);
+  }
+  return RPO_KIT_KEYPOINTS_HEAD_BYTES + k->count * RPO_KIT_KEYPOINT_BYTES;
+}
+
+/* 1 if the length and the count are right; otherwise 0, and nothing is written. */
+ORRERY_MAYBE_UNUSED static int rpo_kit_get_keypoints(const unsigned char* message, uint32_t bytes,
+                                                     rpo_kit_keypoints* k) {
+  const unsigned char* at = message + RPO_KIT_KEYPOINTS_HEAD_BYTES;
+  uint32_t i, count;
+  if (bytes < RPO_KIT_KEYPOINTS_HEAD_BYTES) return 0;
+  count = orrery_get_u32(message + 48);
+  if (count > RPO_KIT_MOST_KEYPOINTS) return 0;
+  if (bytes != RPO_KIT_KEYPOINTS_HEAD_BYTES + count * RPO_KIT_KEYPOINT_BYTES) return 0;
+  k->exposure_ns = orrery_get_i64(message);
+  orrery_get_f64s(message + 8, k->q_CI, 4);
+  k->attitude_sigma_rad = orrery_get_f64(message + 40);
+  k->count = count;
+  for (i = 0; i < count; i++, at += RPO_KIT_KEYPOINT_BYTES) {
+    k->seen[i].point = orrery_get_u32(at);
+    k->seen[i].u_px = orrery_get_f64(at + 4);
+    k->seen[i].v_px = orrery_get_f64(at + 12);
+    k->seen[i].sigma_px = orrery_get_f64(at + 20);
+  }
+  return 1;
+}
+
+ORRERY_MAYBE_UNUSED static void rpo_kit_put_target(unsigned char* message,
+                                                   const rpo_kit_target* t) {
+  orrery_put_i64(message, t->t_ns);
+  orrery_put_f64s(message + 8, t->q_BI, 4);
+  orrery_put_f64s(message + 40, t->omega_BI_B, 3);
+  orrery_put_f64s(message + 64, t->sigma_rad, 3);
+  orrery_put_u32(message + 88, t->poses);
+  orrery_put_u32(message + 92, t->flips);
+  orrery_put_u32(message + 96, t->rejected);
+  orrery_put_u32(message + 100, t->lost);
+}
+
+/* 1 if the length is right; otherwise 0, and nothing is written. */
+ORRERY_MAYBE_UNUSED static int rpo_kit_get_target(const unsigned char* message, uint32_t bytes,
+                                                  rpo_kit_target* t) {
+  if (bytes != RPO_KIT_TARGET_BYTES) return 0;
+  t->t_ns = orrery_get_i64(message);
+  orrery_get_f64s(message + 8, t->q_BI, 4);
+  orrery_get_f64s(message + 40, t->omega_BI_B, 3);
+  orrery_get_f64s(message + 64, t->sigma_rad, 3);
+  t->poses = orrery_get_u32(message + 88);
+  t->flips = orrery_get_u32(message + 92);
+  t->rejected = orrery_get_u32(message + 96);
+  t->lost = orrery_get_u32(message + 100);
   return 1;
 }
 

@@ -174,19 +174,37 @@ void RelativeNavigation::use_target_fix(const EciFix& fix) {
 
 void RelativeNavigation::start_from(const StateMeasurement& state, const EciFix& target,
                                     const Observer& own) {
-  const StateEci other{target.state.r_ECI - state.r_TO_ECI, target.state.v_ECI - state.v_TO_ECI};
-  const RelativeElements a_roe =
-      relative_elements(observer_from_state(target.t_ns, other).mean,
-                        observer_from_state(target.t_ns, target.state).mean);
-  const Matrix6 T =
-      relative_elements_from_inertial_rtn(own.mean.u_rad, mean_motion_radps(own.mean.a_m));
   Matrix6 noise;
   for (int k = 0; k < 3; ++k) {
     noise(k, k) = state.sigma_r_m * state.sigma_r_m;
     noise(3 + k, 3 + k) = state.sigma_v_mps * state.sigma_v_mps;
   }
-  filter_.start(own, a_roe, T * noise * transpose(T));
+  start_at(own, target.state, state, noise);
   count(true, Source::kGnss, target.t_ns);
+}
+
+void RelativeNavigation::start_at(const Observer& own, const StateEci& target,
+                                  const StateMeasurement& state, const Matrix6& covariance_RTN) {
+  const StateEci other{target.r_ECI - state.r_TO_ECI, target.v_ECI - state.v_TO_ECI};
+  const RelativeElements a_roe = relative_elements(observer_from_state(state.t_ns, other).mean,
+                                                   observer_from_state(state.t_ns, target).mean);
+  const Matrix6 T =
+      relative_elements_from_inertial_rtn(own.mean.u_rad, mean_motion_radps(own.mean.a_m));
+  filter_.start(own, a_roe, T * covariance_RTN * transpose(T));
+}
+
+void RelativeNavigation::start_from_track(const StateMeasurement& state,
+                                          const Matrix6& covariance_RTN) {
+  Observer own;
+  if (started() || !own_at(state.t_ns, &own)) return;
+  // A burn that waits would count twice: the track knows of it.
+  for (const Event& event : waiting_) {
+    if (event.kind == Kind::kBurn && event.t_ns <= state.t_ns) return;
+  }
+  const StateEci at = state_from_osculating(osculating_from_mean(own.mean));
+  start_at(own, {at.r_ECI + state.r_TO_ECI, at.v_ECI + state.v_TO_ECI}, state, covariance_RTN);
+  used_until_ns_ = std::max(used_until_ns_, state.t_ns);
+  count(true, Source::kPose, state.t_ns);
 }
 
 void RelativeNavigation::use_bearing(const Bearing& bearing) {

@@ -51,6 +51,10 @@ class RelativeNavigation {
   void target_fix(const EciFix& fix);
   void bearing(const Bearing& bearing);
   void pose(const PlaceMeasurement& place);
+  /// A start from a track of poses, where nothing else has started it; otherwise nothing happens.
+  /// @param covariance_RTN  Of position and inertial velocity, in axes of RTN.
+  void start_from_track(const StateMeasurement& state,
+                        const flight_support::Matrix6& covariance_RTN);
   /// A burn of this spacecraft that will be, or was.
   void burn(std::int64_t t_ns, const flight_support::Vec3& dv_ECI);
 
@@ -90,6 +94,8 @@ class RelativeNavigation {
   void count(bool accepted, Source source, std::int64_t t_ns);
   bool difference(const EciFix& target, StateMeasurement* state) const;
   void start_from(const StateMeasurement& state, const EciFix& target, const Observer& own);
+  void start_at(const Observer& own, const flight_support::StateEci& target,
+                const StateMeasurement& state, const flight_support::Matrix6& covariance_RTN);
   void try_batch();
 
   NavigationOptions options_;

@@ -32,12 +32,46 @@ bool Approach::reached(const RelativeOrbit& now) const {
          std::hypot(miss[kDex], miss[kDey]) < across && std::hypot(miss[kDix], miss[kDiy]) < across;
 }
 
+// Nearer than the waypoint, and not yet at the next one.
+bool Approach::passed(const RelativeOrbit& now) const {
+  if (waypoint_ + 1 >= options_.plan.count) return false;
+  const double here = std::fabs(now.a_roe[kDl]);
+  return here < std::fabs(options_.plan.waypoints[waypoint_].along_track_m) &&
+         here > std::fabs(options_.plan.waypoints[waypoint_ + 1].along_track_m);
+}
+
+// A burn's error moves e and i vectors by up to 2/n of itself.
+bool Approach::plan_leg(const RelativeOrbit& now, std::int64_t end_ns, double spread_m) {
+  TransferOptions options = options_.transfer;
+  options.keep_out_m += spread_m;
+  if (!plan_transfer(now, goal(now), end_ns, options, &transfer_)) {
+    return plan_transfer(now, goal(now), end_ns, options_.transfer, &transfer_);
+  }
+  const double m_per_mps =
+      2.0 * options_.go_sigmas * options_.burn_error / mean_motion_radps(now.chief.a_m);
+  for (int again = 0; again < 2; ++again) {
+    double largest_mps = 0.0;
+    for (int k = 0; k < transfer_.count; ++k) {
+      largest_mps = std::max(largest_mps, norm(transfer_.burns[k].dv_RTN));
+    }
+    options.keep_out_m = options_.transfer.keep_out_m + spread_m + m_per_mps * largest_mps;
+    Transfer safer;
+    if (transfer_.safe_m >= options.keep_out_m ||
+        !plan_transfer(now, goal(now), end_ns, options, &safer)) {
+      break;
+    }
+    transfer_ = safer;
+  }
+  return true;
+}
+
 void Approach::begin_leg(const RelativeOrbit& now, const Matrix6& covariance) {
   const Waypoint& waypoint = options_.plan.waypoints[waypoint_];
   const double margin_m = uncertain_safe_m(now, covariance, options_.go_sigmas);
   if (margin_m < options_.transfer.keep_out_m) return;
   const std::int64_t end_ns = now.t_ns + revolutions_ns(now.chief, waypoint.leg_rev);
-  if (!plan_transfer(now, goal(now), end_ns, options_.transfer, &transfer_)) return;
+  const double spread_m = uncertain_safe_m(now, Matrix6(), 0.0) - margin_m;
+  if (!plan_leg(now, end_ns, std::max(0.0, spread_m))) return;
   phase_ = ApproachPhase::kLeg;
   next_burn_ = 0;
   ++legs_;
@@ -49,7 +83,10 @@ void Approach::end_leg(const RelativeOrbit& now) {
     return;
   }
   phase_ = ApproachPhase::kWaiting;
-  if (!reached(now)) return;
+  if (!reached(now)) {
+    if (passed(now)) ++waypoint_;
+    return;
+  }
   const Waypoint& waypoint = options_.plan.waypoints[waypoint_];
   if (waypoint_ + 1 == options_.plan.count) {
     phase_ = ApproachPhase::kArrived;

@@ -2,9 +2,9 @@
 ///
 /// Method      A leg is one transfer with a fixed end; its burns are flown as planned, and the next
 ///             leg starts from what navigation then says, so that errors of execution and of the
-///             first order do not add up. A leg that misses its waypoint is flown again. Before
-///             each leg the estimate must be good enough: otherwise it waits where it is, which is
-///             safe.
+///             first order do not add up. A leg that misses its waypoint is flown again, unless it
+///             has led past it: then the next one follows. Before each leg the estimate must be
+///             good enough: otherwise it waits where it is, which is safe.
 /// Checked by  test_suites/unit/flight_sw/rpo_kit/guidance_test.cpp
 #pragma once
 
@@ -35,6 +35,9 @@ struct ApproachOptions {
   ApproachPlan plan = {};
   double tolerance = 0.25;  ///< of a waypoint, as a part of its radius or of 5 % of its distance
   double go_sigmas = 3.0;   ///< no leg begins below keep-out with that margin
+  /// 1-sigma of a burn's execution as a part of it: a leg keeps `go_sigmas` of that, and of what is
+  /// not known of the orbit, above keep-out wherever there is such a leg.
+  double burn_error = 0.025;
   double abort_radius_m = 200.0, abort_drift_m = 20.0;
 };
 
@@ -68,6 +71,8 @@ class Approach {
  private:
   flight_support::RelativeElements goal(const flight_support::RelativeOrbit& now) const;
   bool reached(const flight_support::RelativeOrbit& now) const;
+  bool passed(const flight_support::RelativeOrbit& now) const;
+  bool plan_leg(const flight_support::RelativeOrbit& now, std::int64_t end_ns, double spread_m);
   void begin_leg(const flight_support::RelativeOrbit& now,
                  const flight_support::Matrix6& covariance);
   void end_leg(const flight_support::RelativeOrbit& now);

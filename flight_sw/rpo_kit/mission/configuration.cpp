@@ -1,5 +1,7 @@
 #include "rpo_kit/mission/configuration.hpp"
 
+#include <cmath>
+#include <cstdlib>
 #include <cstring>
 
 #include "support/configuration_reader.hpp"
@@ -15,7 +17,10 @@ class Reader final : public flight_support::ConfigurationReader {
  private:
   bool set(const char* key, const char* value) override {
     if (std::strcmp(key, "role") == 0) return set_role(value);
+    if (std::strcmp(key, "waypoint") == 0) return add_waypoint(value);
+    if (std::strcmp(key, "keypoint") == 0) return add_keypoint(value);
     Configuration& c = *configuration_;
+    Camera& camera = c.inspection.camera;
     double leap_seconds = c.earth_time.leap_seconds;
     const NumberKey keys[] = {
         {"crosslink_period_s", &c.crosslink_period_s, 1.0, 600.0},
@@ -33,10 +38,17 @@ class Reader final : public flight_support::ConfigurationReader {
         {"abort_radius_m", &c.approach.abort_radius_m, 10.0, 1e4},
         {"abort_m", &c.autonomy.abort_m, 0.0, 1e4},
         {"hold_limit_s", &c.autonomy.hold_limit_s, 60.0, 1e7},
+        {"camera_f_px", &camera.fx, 1.0, 1e6},
+        {"camera_cx_px", &camera.cx, 0.0, 1e5},
+        {"camera_cy_px", &camera.cy, 0.0, 1e5},
+        {"inertia_y", &c.inspection.filter.inertia[1], 1e-3, 1e3},
+        {"inertia_z", &c.inspection.filter.inertia[2], 1e-3, 1e3},
+        {"tumble_noise_rad2ps3", &c.inspection.filter.angular_rad2ps3, 0.0, 1.0},
     };
     for (std::size_t k = 0; k < sizeof keys / sizeof keys[0]; ++k) {
       if (std::strcmp(key, keys[k].name) != 0) continue;
       if (!set_number(keys[k], 1u << k, value)) return false;
+      camera.fy = camera.fx;
       c.earth_time.leap_seconds = static_cast<int>(leap_seconds);
       if (c.earth_time.leap_seconds != leap_seconds) return fail(key, "is no integer");
       return true;
@@ -54,8 +66,44 @@ class Reader final : public flight_support::ConfigurationReader {
     return true;
   }
 
+  // `count` numbers within +-1e6 and nothing behind them.
+  bool numbers(const char* key, const char* value, int count, double* to) {
+    for (int k = 0; k < count; ++k) {
+      char* end = nullptr;
+      to[k] = std::strtod(value, &end);
+      if (end == value || !(std::fabs(to[k]) <= 1e6)) return fail(key, "lacks a number");
+      value = end;
+    }
+    while (*value == ' ') ++value;
+    return *value == '\0' || fail(key, "has more numbers than it takes");
+  }
+
+  // The first one replaces the plan that is there by default.
+  bool add_waypoint(const char* value) {
+    double x[4];
+    if (!numbers("waypoint", value, 4, x)) return false;
+    ApproachPlan& plan = configuration_->approach.plan;
+    if (!waypoint_seen_) plan.count = 0;
+    waypoint_seen_ = true;
+    if (plan.count == kMostWaypoints) return fail("waypoint", "is one too many");
+    if (!(x[1] > 0.0 && x[2] >= 2.0 && x[3] >= 0.0)) {
+      return fail("waypoint", "is not: along_track_m, radius_m > 0, leg_rev >= 2, hold_rev >= 0");
+    }
+    plan.waypoints[plan.count++] = {x[0], x[1], x[2], x[3]};
+    return true;
+  }
+
+  bool add_keypoint(const char* value) {
+    double x[3];
+    if (!numbers("keypoint", value, 3, x)) return false;
+    InspectionOptions& inspection = configuration_->inspection;
+    if (inspection.points == kMostPoints) return fail("keypoint", "is one too many");
+    inspection.points_B[inspection.points++] = flight_support::vec3(x[0], x[1], x[2]);
+    return true;
+  }
+
   Configuration* configuration_;
-  bool role_seen_ = false;
+  bool role_seen_ = false, waypoint_seen_ = false;
 };
 
 }  // namespace
@@ -64,7 +112,10 @@ bool parse_configuration(const char* text, std::size_t bytes, Configuration* con
                          char* message, std::size_t message_bytes) {
   *configuration = Configuration();
   Reader reader(configuration, message, message_bytes);
-  return reader.read(text, bytes);
+  if (!reader.read(text, bytes)) return false;
+  const NavigationOptions& n = configuration->navigation;
+  configuration->approach.burn_error = std::hypot(n.burn_fraction, n.burn_direction_rad);
+  return true;
 }
 
 }  // namespace rpo_kit

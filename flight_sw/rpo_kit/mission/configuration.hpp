@@ -6,6 +6,7 @@
 #include "rpo_kit/fusion/relative_navigation.hpp"
 #include "rpo_kit/guidance/approach.hpp"
 #include "rpo_kit/mission/autonomy.hpp"
+#include "rpo_kit/near_range/inspection.hpp"
 #include "support/orbit/earth_rotation.hpp"
 
 namespace rpo_kit {
@@ -22,6 +23,7 @@ struct Configuration {
   NavigationOptions navigation = {};
   ApproachOptions approach = {};
   AutonomyOptions autonomy = {};
+  InspectionOptions inspection = {};
 };
 
 /// @param message  Gets one line naming line number, key and accepted range if the text is wrong.

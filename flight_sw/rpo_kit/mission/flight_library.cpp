@@ -19,8 +19,13 @@ enum PortId : std::uint32_t {
   kThruster = 4,
   kEstimate = 5,
   kMode = 6,
-  kTelemetry = 7
+  kTelemetry = 7,
+  kBearing = 8,
+  kKeypoints = 9,
+  kTarget = 10
 };
+
+constexpr int kPorts = 11;
 
 const unsigned char* data_of(Bytes bytes) {
   return static_cast<const unsigned char*>(bytes.data);
@@ -62,6 +67,9 @@ class HostOutputs final : public Outputs {
     orrery_put_estimate(message, e.t_ns, e.r_DC_RTN, e.v_DC_RTN, e.sigma_r_m, e.sigma_v_mps);
     host_.output(kEstimate, {message, sizeof message});
   }
+  void out_target(const unsigned char* message, std::uint32_t bytes) override {
+    host_.output(kTarget, {message, bytes});
+  }
   void out_telemetry(const unsigned char* packet, std::uint32_t bytes) override {
     host_.output(kTelemetry, {packet, bytes});
   }
@@ -88,28 +96,38 @@ class Library {
   std::int32_t command(std::int64_t now_ns, Bytes bytes) {
     return status(kit_.in_command(now_ns, data_of(bytes), bytes.size));
   }
+  std::int32_t bearing(std::int64_t, Bytes bytes) {
+    return status(kit_.in_bearing(data_of(bytes), bytes.size));
+  }
+  std::int32_t keypoints(std::int64_t, Bytes bytes) {
+    return status(kit_.in_keypoints(data_of(bytes), bytes.size));
+  }
   std::int32_t tick(std::int64_t now_ns) {
     kit_.in_tick(now_ns);
     return ORRERY_OK;
   }
-  static const Port (&ports())[8];
+  static const Port (&ports())[kPorts];
 
  private:
   HostOutputs outputs_;
   RpoKit kit_;
 };
 
-const Port (&Library::ports())[8] {
-  static const Port table[8] = {
+const Port (&Library::ports())[kPorts] {
+  static const Port table[kPorts] = {
       {kGnss, ORRERY_IN, ORRERY_STREAM, "gnss", 4096, &Library::gnss},
       {kCrosslink, ORRERY_IN, ORRERY_PACKET, "crosslink", 256, &Library::crosslink},
       {kCommand, ORRERY_IN, ORRERY_PACKET, "command", 256, &Library::command},
+      {kBearing, ORRERY_IN, ORRERY_PACKET, "bearing", RPO_KIT_BEARING_BYTES, &Library::bearing},
+      {kKeypoints, ORRERY_IN, ORRERY_PACKET, "keypoints", RPO_KIT_KEYPOINTS_BYTES,
+       &Library::keypoints},
       {kCrosslink, ORRERY_OUT, ORRERY_PACKET, "crosslink", formation_keeping::kCrosslinkBytes,
        nullptr},
       {kThruster, ORRERY_OUT, ORRERY_PACKET, "thruster", ORRERY_THRUSTER_BYTES, nullptr},
       {kEstimate, ORRERY_OUT, ORRERY_PACKET, "estimate", ORRERY_ESTIMATE_BYTES, nullptr},
       {kMode, ORRERY_OUT, ORRERY_PACKET, "mode", ORRERY_MODE_BYTES, nullptr},
       {kTelemetry, ORRERY_OUT, ORRERY_PACKET, "telemetry", RPO_KIT_TELEMETRY_BYTES, nullptr},
+      {kTarget, ORRERY_OUT, ORRERY_PACKET, "target", RPO_KIT_TARGET_BYTES, nullptr},
   };
   return table;
 }

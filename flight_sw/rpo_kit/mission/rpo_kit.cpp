@@ -23,6 +23,35 @@ LinkRole peer(Role role) {
   return role == Role::kTarget ? LinkRole::kDeputy : LinkRole::kChief;
 }
 
+// Hamilton's product, w first; q and R turn the same components. @return false: no unit quaternion.
+bool matrix_of_quaternion(const double q[4], Mat3* R) {
+  const double w = q[0], x = q[1], y = q[2], z = q[3];
+  if (!(std::fabs(w * w + x * x + y * y + z * z - 1.0) < 1e-6)) return false;
+  *R = Mat3{{{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
+             {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
+             {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}}};
+  return true;
+}
+
+// By the largest component (Shepperd 1978), w not negative.
+void quaternion_of_matrix(const Mat3& R, double q[4]) {
+  const double t = R(0, 0) + R(1, 1) + R(2, 2);
+  const double squares[4] = {t, R(0, 0), R(1, 1), R(2, 2)};
+  const long at = std::max_element(squares, squares + 4) - squares;
+  if (at == 0) {
+    q[0] = 1 + t, q[1] = R(2, 1) - R(1, 2), q[2] = R(0, 2) - R(2, 0), q[3] = R(1, 0) - R(0, 1);
+  } else {
+    const int i = static_cast<int>(at) - 1, j = (i + 1) % 3, k = (i + 2) % 3;
+    q[0] = R(k, j) - R(j, k);
+    q[1 + i] = 1 + R(i, i) - R(j, j) - R(k, k);
+    q[1 + j] = R(i, j) + R(j, i);
+    q[1 + k] = R(i, k) + R(k, i);
+  }
+  const double size =
+      std::copysign(std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), q[0]);
+  for (int k = 0; k < 4; ++k) q[k] /= size;
+}
+
 }  // namespace
 
 RpoKit::RpoKit(Outputs& outputs, const Configuration& configuration, const Boot& boot)
@@ -31,6 +60,7 @@ RpoKit::RpoKit(Outputs& outputs, const Configuration& configuration, const Boot&
       sender_(link_role(configuration.role), boot.boot_count),
       receiver_(peer(configuration.role)),
       navigation_(configuration.navigation),
+      inspection_(configuration.inspection),
       approach_(configuration.approach) {
   novatel_framer_init(&framer_, gnss_room_, sizeof gnss_room_);
   out_.out_mode(boot.now_ns, static_cast<std::uint32_t>(mode()));
@@ -103,6 +133,43 @@ bool RpoKit::in_bearing(const Bearing& bearing) {
 bool RpoKit::in_pose(const PlaceMeasurement& place) {
   if (!is_chaser() || !is_finite(place.r_TO_ECI) || !is_finite(place.covariance)) return reject();
   navigation_.pose(place);
+  return true;
+}
+
+bool RpoKit::in_bearing(const unsigned char* message, std::uint32_t bytes) {
+  rpo_kit_bearing b;
+  if (rpo_kit_get_bearing(message, bytes, &b) == 0) return reject();
+  const double* d = b.direction_ECI;
+  return in_bearing({b.exposure_ns, vec3(d[0], d[1], d[2]), b.sigma_rad});
+}
+
+bool RpoKit::in_keypoints(const unsigned char* message, std::uint32_t bytes) {
+  rpo_kit_keypoints k;
+  if (!is_chaser() || rpo_kit_get_keypoints(message, bytes, &k) == 0) return reject();
+  Sighting sighting;
+  sighting.t_ns = k.exposure_ns;
+  sighting.attitude_sigma_rad = k.attitude_sigma_rad;
+  if (!matrix_of_quaternion(k.q_CI, &sighting.R_CI)) return reject();
+  for (std::uint32_t i = 0; i < k.count; ++i) {
+    const rpo_kit_keypoint& at = k.seen[i];
+    if (!(at.sigma_px > 0.0) || at.point >= static_cast<unsigned>(kMostPoints)) return reject();
+    sighting.seen.push_back({static_cast<int>(at.point), {at.u_px, at.v_px}, at.sigma_px});
+  }
+  Observer own;
+  // Before the first fix of its own orbit it knows no RTN.
+  if (!navigation_.own_at(k.exposure_ns, &own)) return true;
+  const int lost = inspection_.lost();
+  const Sighted sighted = inspection_.look(sighting, own);
+  if (inspection_.lost() != lost) {
+    out_.log(LogLevel::kError, "a covariance of the near range has no Cholesky factor");
+  }
+  if (sighted.place) navigation_.pose(sighted.measurement);
+  if (!navigation_.started() && inspection_.settled()) {
+    Matrix6 covariance;
+    const StateMeasurement state = inspection_.state(own, &covariance);
+    navigation_.start_from_track(state, covariance);
+  }
+  if (inspection_.tracking()) send_target();
   return true;
 }
 
@@ -191,6 +258,9 @@ void RpoKit::command_burn(const RelativeOrbit& now, const Burn& burn) {
     return;
   }
   navigation_.burn(burn.t_ns, dv_ECI);
+  inspection_.burn(burn.t_ns, burn.dv_RTN,
+                   burn_covariance(burn.dv_RTN, configuration_.navigation.burn_fraction,
+                                   configuration_.navigation.burn_direction_rad));
   delta_v_mps_ += norm(burn.dv_RTN);
   ++burns_;
   char line[128];
@@ -216,6 +286,24 @@ void RpoKit::send_estimate(const RelativeOrbit& now, const Matrix6& covariance) 
     e.sigma_v_mps[k] = std::sqrt(P(k + 3, k + 3));
   }
   out_.out_estimate(e);
+}
+
+void RpoKit::send_target() {
+  const PoseFilter& filter = inspection_.filter();
+  rpo_kit_target t;
+  t.t_ns = filter.t_ns();
+  quaternion_of_matrix(filter.R_BI(), t.q_BI);
+  for (int k = 0; k < 3; ++k) {
+    t.omega_BI_B[k] = filter.omega_BI_B()[k];
+    t.sigma_rad[k] = std::sqrt(filter.covariance()(kNearRotation + k, kNearRotation + k));
+  }
+  t.poses = static_cast<std::uint32_t>(inspection_.poses());
+  t.flips = static_cast<std::uint32_t>(filter.flips());
+  t.rejected = static_cast<std::uint32_t>(filter.rejected());
+  t.lost = static_cast<std::uint32_t>(inspection_.lost());
+  unsigned char message[RPO_KIT_TARGET_BYTES];
+  rpo_kit_put_target(message, &t);
+  out_.out_target(message, sizeof message);
 }
 
 void RpoKit::send_telemetry(std::int64_t now_ns, const RelativeOrbit* now,

@@ -33,6 +33,7 @@ class Outputs {
   virtual bool out_maneuver(std::int64_t mid_burn_ns, const double dv_ECI[3]) = 0;
   virtual void out_mode(std::int64_t t_ns, std::uint32_t mode) = 0;
   virtual void out_estimate(const RelativeOutput& estimate) = 0;
+  virtual void out_target(const unsigned char* message, std::uint32_t bytes) = 0;
   virtual void out_telemetry(const unsigned char* packet, std::uint32_t bytes) = 0;
   /// Replaces the one before.
   virtual void request_tick(std::int64_t at_ns) = 0;
@@ -57,11 +58,14 @@ class RpoKit {
   bool in_command(std::int64_t now_ns, const unsigned char* message, std::uint32_t bytes);
   /// From image processing: a direction to the target, a place of it.
   bool in_bearing(const Bearing& bearing);
+  bool in_bearing(const unsigned char* message, std::uint32_t bytes);
   bool in_pose(const PlaceMeasurement& place);
+  bool in_keypoints(const unsigned char* message, std::uint32_t bytes);
   void in_tick(std::int64_t now_ns);
 
   Mode mode() const { return autonomy_.mode(); }
   const RelativeNavigation& navigation() const { return navigation_; }
+  const Inspection& inspection() const { return inspection_; }
   const Approach& approach() const { return approach_; }
 
  private:
@@ -80,6 +84,7 @@ class RpoKit {
   void command_burn(const flight_support::RelativeOrbit& now, const flight_support::Burn& burn);
   void send_estimate(const flight_support::RelativeOrbit& now,
                      const flight_support::Matrix6& covariance);
+  void send_target();
   void send_telemetry(std::int64_t now_ns, const flight_support::RelativeOrbit* now,
                       const flight_support::Matrix6& covariance);
 
@@ -91,6 +96,7 @@ class RpoKit {
   formation_keeping::CrosslinkSender sender_;
   formation_keeping::CrosslinkReceiver receiver_;
   RelativeNavigation navigation_;
+  Inspection inspection_;
   Approach approach_;
   Autonomy autonomy_;
   std::int64_t last_crosslink_slot_ = -1, last_telemetry_slot_ = -1;

@@ -44,6 +44,12 @@ Vec3 turn_vector(const Mat3& D) {
   return (kPi / norm(column)) * column;
 }
 
+template <int N>
+bool positive_definite(const Matrix<N, N>& P) {
+  Matrix<N, N> L;
+  return cholesky(P, &L);
+}
+
 void put(Covariance* P, int row, int column, const Mat3& block) {
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) (*P)(row + r, column + c) = block(r, c);
@@ -71,6 +77,27 @@ Matrix<6, 6> measured_covariance(const ChaserFrame& frame, const Pose& pose,
   return symmetric(T * (pose.covariance + own) * transpose(T));
 }
 
+#ifdef RPO_KIT_DEFECT_TWO_ORDERS
+// For tests: the watch over flips with a state order of its own, turn before place. On the way back
+// its blocks change places and the mixed one is not transposed: symmetric, with the right diagonal,
+// and no covariance.
+Pose after_flips(const Pose& pose) {
+  Pose handed = pose;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) {
+      const double mixed = pose.covariance(kPoseRotation + r, kPosePosition + c);
+      handed.covariance(kPosePosition + r, kPoseRotation + c) = mixed;
+      handed.covariance(kPoseRotation + c, kPosePosition + r) = mixed;
+    }
+  }
+  return handed;
+}
+#else
+const Pose& after_flips(const Pose& pose) {
+  return pose;
+}
+#endif
+
 }  // namespace
 
 void PoseFilter::start(const ChaserFrame& frame, const Pose& pose) {
@@ -92,7 +119,8 @@ void PoseFilter::start(const ChaserFrame& frame, const Pose& pose) {
     P_(kNearRate + r, kNearRate + r) = w * w;
   }
   started_ = true;
-  flips_in_a_row_ = 0;
+  healthy_ = positive_definite(P_);
+  flips_in_a_row_ = agreed_ = 0;
 }
 
 // Euler's equations by the midpoint rule: 1e-6 rad/s^2 of rates of a few deg/s at steps of 1 s.
@@ -169,6 +197,7 @@ void PoseFilter::correct(const Matrix<M, kNearStates>& H, const Vector<M>& innov
   // Joseph's form: stays positive whatever rounding does.
   const Covariance A = identity<kNearStates>() - K * H;
   P_ = symmetric(A * P_ * transpose(A) + K * R * Kt);
+  healthy_ = healthy_ && positive_definite(P_);
   for (int k = 0; k < 3; ++k) {
     r_[k] += dx[kNearPosition + k];
     v_[k] += dx[kNearVelocity + k];
@@ -194,6 +223,8 @@ PoseVerdict PoseFilter::update(const ChaserFrame& frame, const Pose& pose) {
   if (frame.t_ns < t_ns_) return PoseVerdict::kRejected;
   predict(frame.t_ns, frame.orbital_rate_radps);
   const Matrix<6, 6> R = measured_covariance(frame, pose, options_.least_rotation_rad);
+  healthy_ = healthy_ && positive_definite(R);
+  if (!healthy_) return PoseVerdict::kRejected;
   const Vec3 place = frame.R_HI * (transpose(frame.R_CI) * pose.r_BC_C) - r_;
   const Mat3 R_BI = transpose(pose.R_CB) * frame.R_CI;
   const Vec3 rotation = turn_vector(R_BI * transpose(R_BI_));
@@ -209,6 +240,7 @@ PoseVerdict PoseFilter::update(const ChaserFrame& frame, const Pose& pose) {
   if (squared_mahalanobis(S, innovation) < options_.gate && norm(rotation) < 0.8) {
     correct<6>(H, innovation, R);
     ++used_;
+    ++agreed_;
     flips_in_a_row_ = 0;
     return PoseVerdict::kUsed;
   }
@@ -223,8 +255,14 @@ PoseVerdict PoseFilter::update(const ChaserFrame& frame, const Pose& pose) {
     return PoseVerdict::kRejected;
   }
   ++flips_;
-  if (same_flip_again(rotation)) {
+  // Of two that contradict each other the newer is as good; and as long as the rate is not known,
+  // a flip of the first would never look the same twice.
+  if (agreed_ == 0) {
     start(frame, pose);
+    return PoseVerdict::kRestarted;
+  }
+  if (same_flip_again(rotation)) {
+    start(frame, after_flips(pose));
     return PoseVerdict::kRestarted;
   }
   correct<3>(H_place, place, R_place);

@@ -8,7 +8,10 @@
 /// Flips       A pose whose place fits and whose attitude does not is taken for its place alone. If
 ///             `flips_to_believe` such in a row agree on one other attitude, and nothing spoke for
 ///             the filter's own meanwhile, it was the filter that had flipped: it starts again from
-///             them.
+///             them. As long as no second pose has agreed with the first, it starts from the
+///             newest.
+/// Health      Whatever a pose says of itself, and the covariance after each correction, must have
+///             a Cholesky factor; otherwise the filter is not healthy and stays as it was.
 /// Valid for   ranges below 1 km, gaps of minutes; poses by ascending time.
 /// Checked by  test_suites/unit/flight_sw/rpo_kit/near_range_test.cpp
 #pragma once
@@ -46,6 +49,8 @@ class PoseFilter {
   explicit PoseFilter(const PoseFilterOptions& options = {}) : options_(options) {}
 
   bool started() const { return started_; }
+  /// False since a covariance had no Cholesky factor: nothing of it is to be believed any more.
+  bool healthy() const { return healthy_; }
   void start(const ChaserFrame& frame, const Pose& pose);
   /// From what other sensors know, attitude open until the first pose.
   void predict(std::int64_t t_ns, double orbital_rate_radps);
@@ -77,8 +82,9 @@ class PoseFilter {
   flight_support::Vec3 r_, v_, omega_;
   flight_support::Mat3 R_BI_ = flight_support::identity<3>();
   flight_support::Matrix<kNearStates, kNearStates> P_;
-  bool started_ = false;
+  bool started_ = false, healthy_ = true;
   int used_ = 0, flips_ = 0, rejected_ = 0, flips_in_a_row_ = 0;
+  int agreed_ = 0;                                             // poses used since the start
   flight_support::Mat3 flip_ = flight_support::identity<3>();  // of the last one, in B
 };
 

@@ -309,6 +309,24 @@ TEST(PoseFilterTest, RecoversFromAFlippedStart) {
   EXPECT_LT(angle_rad(filter.R_BI(), scene.R_BI()), 0.1);
 }
 
+// One mirrored pose to begin with, and images 20 deg of tumbling apart: its rate unknown, the
+// filter would see another turn each time.
+TEST(PoseFilterTest, RecoversFromAFlippedFirstPose) {
+  InspectionScene scene(7);
+  PoseFilter filter(tumbler());
+  for (int k = 1; k <= 30; ++k) {
+    scene.run_for(20.0);
+    const ChaserFrame frame = scene.frame();
+    Pose pose;
+    Look how;
+    how.flipped = k == 1;
+    if (!estimate_pose(pose_camera(), kTarget, scene.look(how), {}, &pose)) continue;
+    filter.update(frame, pose);
+  }
+  EXPECT_LT(angle_rad(filter.R_BI(), scene.R_BI()), 0.1);
+  EXPECT_GE(filter.used(), 20);
+}
+
 TEST(PoseFilterTest, PoseElsewhereOrOfThePastIsRejected) {
   InspectionScene scene(6);
   PoseFilter filter(tumbler());

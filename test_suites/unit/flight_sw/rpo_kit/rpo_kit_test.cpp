@@ -30,6 +30,9 @@ struct Bus : Outputs {
   }
   void out_mode(std::int64_t, std::uint32_t mode) override { modes.push_back(mode); }
   void out_estimate(const RelativeOutput& e) override { estimate = e; }
+  void out_target(const unsigned char* message, std::uint32_t bytes) override {
+    EXPECT_EQ(rpo_kit_get_target(message, bytes, &target), 1);
+  }
   void out_telemetry(const unsigned char* packet, std::uint32_t bytes) override {
     EXPECT_EQ(rpo_kit_get_telemetry(packet, bytes, &telemetry), 1);
   }
@@ -46,6 +49,7 @@ struct Bus : Outputs {
   std::vector<std::uint32_t> modes;
   RelativeOutput estimate;
   rpo_kit_telemetry telemetry = {};
+  rpo_kit_target target = {};
   std::int64_t tick_ns = -1;
   std::vector<std::string> complaints;
   bool refuse = false;
@@ -135,8 +139,23 @@ TEST(RpoKitTest, UnusableInputsAreRejectedAndCounted) {
   EXPECT_FALSE(chaser.in_bearing({kEpoch_ns, vec3(0, 0, 2), 1e-4}));
   EXPECT_FALSE(chaser.in_bearing({kEpoch_ns, vec3(0, 0, 1), 0.0}));
   EXPECT_FALSE(chaser.in_pose({kEpoch_ns, vec3(0, 0, NAN), identity<3>()}));
+  EXPECT_FALSE(chaser.in_bearing(garbage, RPO_KIT_BEARING_BYTES - 1));
+  EXPECT_FALSE(chaser.in_keypoints(garbage, sizeof garbage));
+  rpo_kit_keypoints keypoints = {};
+  unsigned char message[RPO_KIT_KEYPOINTS_BYTES];
+  const auto given = [&] {
+    const std::uint32_t bytes = rpo_kit_put_keypoints(message, &keypoints);
+    return chaser.in_keypoints(message, bytes);
+  };
+  EXPECT_FALSE(given());  // a quaternion of no length
+  keypoints.q_CI[0] = 1;
+  keypoints.count = 1;
+  EXPECT_FALSE(given());  // a keypoint without noise
+  keypoints.seen[0].sigma_px = 1;
+  EXPECT_TRUE(given());
+  EXPECT_FALSE(chaser.in_keypoints(message, RPO_KIT_KEYPOINTS_HEAD_BYTES));
   chaser.in_tick(kEpoch_ns);
-  EXPECT_EQ(bus.telemetry.rejected, 5u);
+  EXPECT_EQ(bus.telemetry.rejected, 10u);
   Bus quiet;
   RpoKit target(quiet, configured("role = target\n"), {kEpoch_ns, 0});
   EXPECT_FALSE(give(&target, kEpoch_ns, RPO_KIT_GO));
@@ -155,6 +174,17 @@ TEST(RpoKitConfigurationTest, WrongTextIsNamed) {
             "configuration line 2: 'keep_out' is no key of this package");
   EXPECT_EQ(complaint("role = chief\n"), "configuration line 1: 'role' is not target or chaser");
   EXPECT_NE(complaint("lost_s = 5\n").find("[60, 1e+06]"), std::string::npos);
+  EXPECT_NE(complaint("waypoint = -100 20 3\n").find("lacks a number"), std::string::npos);
+  EXPECT_NE(complaint("waypoint = -100 0 3 0\n").find("radius_m > 0"), std::string::npos);
+  EXPECT_NE(complaint("keypoint = 1 2 3 4\n").find("more numbers"), std::string::npos);
+  const Configuration own = configured(
+      "waypoint = -100 20 3 1\nwaypoint = 0 15 2 0\nkeypoint = 0.1 -0.2 0.3\ncamera_f_px = 2000\n");
+  EXPECT_EQ(own.approach.plan.count, 2);
+  EXPECT_EQ(own.approach.plan.waypoints[1].radius_m, 15.0);
+  EXPECT_EQ(own.inspection.points, 1);
+  EXPECT_EQ(own.inspection.points_B[0][1], -0.2);
+  EXPECT_EQ(own.inspection.camera.fy, 2000.0);
+  EXPECT_EQ(configured("").approach.plan.count, 7);
   EXPECT_EQ(configured("keep_out_m = 12\n").approach.transfer.keep_out_m, 12.0);
 }
 
