@@ -306,6 +306,7 @@ TEST(PoseFilterTest, RecoversFromAFlippedStart) {
     restarted |= filter.update(frame, pose) == PoseVerdict::kRestarted && k > 1;
   }
   EXPECT_TRUE(restarted);
+  EXPECT_TRUE(filter.healthy());  // the hand-over once lost it (rpo_kit_defect_two_orders)
   EXPECT_LT(angle_rad(filter.R_BI(), scene.R_BI()), 0.1);
 }
 
