@@ -44,31 +44,25 @@ static uint64_t instructions_of_marks;
 
 typedef struct connection {
   int in, out;
-  struct timespec begin;
+  uint64_t begin_ns;
 } connection;
 
 static int32_t read_all(void* context, void* buffer, uint32_t bytes) {
-  const connection* c = context;
-  char* at = buffer;
-  while (bytes > 0) {
-    const ssize_t n = read(c->in, at, bytes);
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return -1;
-    at += n;
-    bytes -= (uint32_t)n;
+  uint32_t at = 0;
+  while (at < bytes) {
+    const ssize_t n = read(((connection*)context)->in, (char*)buffer + at, bytes - at);
+    if (n == 0 || (n < 0 && errno != EINTR)) return -1;
+    if (n > 0) at += (uint32_t)n;
   }
   return 0;
 }
 
 static int32_t write_all(void* context, const void* data, uint32_t bytes) {
-  const connection* c = context;
-  const char* at = data;
-  while (bytes > 0) {
-    const ssize_t n = write(c->out, at, bytes);
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return -1;
-    at += n;
-    bytes -= (uint32_t)n;
+  uint32_t at = 0;
+  while (at < bytes) {
+    const ssize_t n = write(((connection*)context)->out, (const char*)data + at, bytes - at);
+    if (n == 0 || (n < 0 && errno != EINTR)) return -1;
+    if (n > 0) at += (uint32_t)n;
   }
   return 0;
 }
@@ -85,45 +79,39 @@ static void count_instructions(const char* page) {
   const void* mapped = mmap(NULL, 16, PROT_READ, MAP_SHARED, atoi(page), 0);
   if (mapped == MAP_FAILED) fail("nobody counts instructions at descriptor", page);
   instructions = mapped;
-  mark(1), mark(2); /* write() is resolved now */
-  mark(1), mark(2);
+  mark(1), mark(2), mark(1), mark(2); /* write() is resolved by then */
   instructions_of_marks = *instructions;
 }
 
+static uint64_t host_now_ns(void) {
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
+}
+
 static void call_begins(void* context) {
-  connection* c = context;
   if (orrery_target_heap_enter != NULL) orrery_target_heap_enter();
-  clock_gettime(CLOCK_MONOTONIC, &c->begin);
+  ((connection*)context)->begin_ns = host_now_ns();
   if (instructions != NULL) mark(1);
 }
 
 /* Host time is for reports alone; instructions repeat, so simulated time may depend on them. */
 static void call_ended(void* context, orrery_wire_cost* cost) {
-  const connection* c = context;
-  struct timespec now;
   if (instructions != NULL) mark(2);
-  clock_gettime(CLOCK_MONOTONIC, &now);
   cost->unit = instructions != NULL ? ORRERY_WU_INSTRUCTIONS : ORRERY_WU_NS;
-  cost->cost = instructions != NULL
-                   ? *instructions - instructions_of_marks
-                   : (uint64_t)((int64_t)(now.tv_sec - c->begin.tv_sec) * 1000000000 +
-                                (now.tv_nsec - c->begin.tv_nsec));
+  cost->cost = instructions != NULL ? *instructions - instructions_of_marks
+                                    : host_now_ns() - ((connection*)context)->begin_ns;
   if (orrery_target_heap_leave != NULL) orrery_target_heap_leave(cost);
 }
 
+/* The library is not closed: a client that goes away leaves one that no destroy has ended. */
 static int serve(const char* path, int in, int out) {
-  enum { kWork_bytes = 8 << 20 };
+  static uint64_t work[1 << 20];
   connection c = {.in = in, .out = out};
   const orrery_wire_link link = {&c, read_all, write_all, call_begins, call_ended};
-  void *work, *library;
-  int32_t status;
+  void* library;
   const orrery_flight* flight = open_flight_library(path, &library);
-  work = malloc(kWork_bytes);
-  if (work == NULL) fail("no memory for", path);
-  status = orrery_wire_serve(&link, flight, work, kWork_bytes);
-  free(work);
-  /* Not closed: a client that goes away leaves a library that no destroy has ended. */
-  return status == ORRERY_OK ? 0 : 1;
+  return orrery_wire_serve(&link, flight, work, sizeof work) == ORRERY_OK ? 0 : 1;
 }
 
 /* What flight code prints must not get between the frames. */
@@ -142,13 +130,10 @@ static speed_t speed_of(const char* baud) {
   } kSpeeds[] = {{"9600", B9600},     {"19200", B19200},   {"38400", B38400},
                  {"57600", B57600},   {"115200", B115200}, {"230400", B230400},
                  {"460800", B460800}, {"921600", B921600}, {"1000000", B1000000}};
-  size_t i;
-  for (i = 0; i < sizeof kSpeeds / sizeof kSpeeds[0]; ++i) {
-    if (strcmp(kSpeeds[i].name, baud) == 0) return kSpeeds[i].speed;
-  }
-  fail("the baud rate is one of 9600 19200 38400 57600 115200 230400 460800 921600 1000000, not",
-       baud);
-  return B0;
+  size_t i = 0, count = sizeof kSpeeds / sizeof kSpeeds[0];
+  while (i < count && strcmp(kSpeeds[i].name, baud) != 0) ++i;
+  if (i == count) fail("not a rate from 9600 to 921600 baud, or 1000000", baud);
+  return kSpeeds[i].speed;
 }
 
 /* Its library starts as it was linked, and a crash ends that process alone. */
@@ -181,8 +166,6 @@ static int serve_serial(const char* path, char* device, int once) {
   if (fd < 0 || tcgetattr(fd, &line) != 0) fail(device, strerror(errno));
   cfmakeraw(&line);
   line.c_cflag |= CLOCAL | CREAD;
-  line.c_cc[VMIN] = 1;
-  line.c_cc[VTIME] = 0;
   if (cfsetspeed(&line, speed_of(baud)) != 0 || tcsetattr(fd, TCSANOW, &line) != 0) {
     fail(device, strerror(errno));
   }
@@ -198,39 +181,40 @@ static int serve_serial(const char* path, char* device, int once) {
   return status;
 }
 
+static int listen_at(int family, struct sockaddr* address, socklen_t bytes) {
+  const int fd = socket(family, SOCK_STREAM | SOCK_CLOEXEC, 0), yes = 1;
+  if (fd < 0 || setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes) != 0 ||
+      bind(fd, address, bytes) != 0 || listen(fd, 1) != 0) {
+    fail("cannot listen", strerror(errno));
+  }
+  return fd;
+}
+
 static int listen_unix(const char* path) {
   struct sockaddr_un address = {.sun_family = AF_UNIX};
-  const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
   if (strlen(path) >= sizeof address.sun_path) fail("the path of a Unix socket is too long", path);
   strcpy(address.sun_path, path);
   unlink(path);
-  if (fd < 0 || bind(fd, (struct sockaddr*)&address, sizeof address) != 0 || listen(fd, 1) != 0) {
-    fail(path, strerror(errno));
-  }
-  return fd;
+  return listen_at(AF_UNIX, (struct sockaddr*)&address, sizeof address);
 }
 
 static int listen_tcp(char* where) {
   struct sockaddr_in address = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
   socklen_t bytes = sizeof address;
-  char* colon = strrchr(where, ':');
-  char* end = NULL;
+  char *colon = strrchr(where, ':'), *end = NULL;
   const char* digits = colon == NULL ? where : colon + 1;
   const long port = strtol(digits, &end, 10);
-  const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), yes = 1;
+  int fd;
   if (*digits == '\0' || *end != '\0' || port < 0 || port > 65535) {
     fail("--tcp takes [ADDRESS:]PORT with a port of 0 to 65535, not", where);
   }
-  if (colon != NULL) {
-    *colon = '\0';
-    if (inet_pton(AF_INET, where, &address.sin_addr) != 1) fail("not an IPv4 address", where);
+  if (colon != NULL) *colon = '\0';
+  if (colon != NULL && inet_pton(AF_INET, where, &address.sin_addr) != 1) {
+    fail("not an IPv4 address", where);
   }
   address.sin_port = htons((uint16_t)port);
-  if (fd >= 0) setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  if (fd < 0 || bind(fd, (struct sockaddr*)&address, bytes) != 0 || listen(fd, 1) != 0 ||
-      getsockname(fd, (struct sockaddr*)&address, &bytes) != 0) {
-    fail("cannot listen", strerror(errno));
-  }
+  fd = listen_at(AF_INET, (struct sockaddr*)&address, bytes);
+  getsockname(fd, (struct sockaddr*)&address, &bytes);
   fprintf(stderr, PROGRAM ": listens on port %d\n", ntohs(address.sin_port));
   return fd;
 }
@@ -241,8 +225,7 @@ static int serve_listener(const char* path, int listener, int once) {
     const int yes = 1, fd = accept4(listener, NULL, NULL, SOCK_CLOEXEC);
     if (fd < 0 && errno == EINTR) continue;
     if (fd < 0) fail("accept", strerror(errno));
-    /* Fails on a Unix socket: no matter. */
-    setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
+    setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes); /* fails on a Unix socket */
     status = serve_in_child(path, fd, listener);
     close(fd);
   } while (!once);
@@ -252,34 +235,35 @@ static int serve_listener(const char* path, int listener, int once) {
 int main(int argc, char** argv) {
   const char *path = NULL, *how = "--stdio";
   char* where = NULL;
-  int once = 0, i;
+  int once = 0, wrong = 0, i;
   for (i = 1; i < argc; ++i) {
-    const int takes_where = strcmp(argv[i], "--unix") == 0 || strcmp(argv[i], "--tcp") == 0 ||
-                            strcmp(argv[i], "--serial") == 0;
-    if (strcmp(argv[i], "--once") == 0) {
+    const char* option = argv[i];
+    if (strcmp(option, "--once") == 0) {
       once = 1;
-    } else if (strcmp(argv[i], "--instructions") == 0 && i + 1 < argc) {
+    } else if (strcmp(option, "--stdio") == 0) {
+      how = option;
+    } else if (option[0] != '-') {
+      wrong |= path != NULL;
+      path = option;
+    } else if (i + 1 == argc) {
+      wrong = 1;
+    } else if (strcmp(option, "--instructions") == 0) {
       count_instructions(argv[++i]);
-    } else if (strcmp(argv[i], "--heap") == 0 && i + 1 < argc) {
-      if (orrery_target_heap_open == NULL) fail("no simulated heap is linked, so no", argv[i]);
+    } else if (strcmp(option, "--heap") == 0) {
+      if (orrery_target_heap_open == NULL) fail("no simulated heap is linked, so no", option);
       orrery_target_heap_open((uint32_t)strtoul(argv[++i], NULL, 10));
-    } else if (takes_where && i + 1 < argc) {
-      how = argv[i];
+    } else {
+      how = option;
       where = argv[++i];
-    } else if (argv[i][0] != '-' && path == NULL) {
-      path = argv[i];
-    } else if (strcmp(argv[i], "--stdio") != 0) {
-      path = NULL;
-      break;
     }
   }
-  if (path == NULL) {
-    fputs(kUsage, stderr);
-    return 2;
-  }
   signal(SIGPIPE, SIG_IGN);
-  if (where == NULL) return serve_stdio(path);
-  if (strcmp(how, "--serial") == 0) return serve_serial(path, where, once);
-  return serve_listener(path, strcmp(how, "--unix") == 0 ? listen_unix(where) : listen_tcp(where),
-                        once);
+  if (path != NULL && !wrong) {
+    if (strcmp(how, "--stdio") == 0) return serve_stdio(path);
+    if (strcmp(how, "--serial") == 0) return serve_serial(path, where, once);
+    if (strcmp(how, "--unix") == 0) return serve_listener(path, listen_unix(where), once);
+    if (strcmp(how, "--tcp") == 0) return serve_listener(path, listen_tcp(where), once);
+  }
+  fputs(kUsage, stderr);
+  return 2;
 }
