@@ -23,7 +23,7 @@ RunRecord flown_with(const CampaignOptions& options, const CampaignManifest& man
                      double value) {
   RunCommand command = command_of(manifest, options.run);
   command.flags.push_back("--orrery_set=" + options.parameter + "=" + to_text(value));
-  RunPool pool(1, options.time_limit);
+  RunPool pool(1, options.limits);
   pool.start(command);
   RunRecord record;
   while (!pool.is_idle()) {

@@ -129,7 +129,7 @@ FlownRuns fly(const testing::TestInfo& test, const Runs& runs) {
   FlownRuns flown;
   flown.n = static_cast<std::uint32_t>(runs.n);
   const auto store = store_of(test, runs);
-  RunPool pool(jobs(), runs.time_limit);
+  RunPool pool(jobs(), {.time = runs.time_limit, .memory_bytes = runs.memory_limit_bytes});
   std::uint32_t next = 0;
   while (next < flown.n || !pool.is_idle()) {
     while (next < flown.n && pool.has_room()) pool.start(command_of(test, next++));

@@ -30,8 +30,9 @@
 namespace orrery {
 
 struct Runs {
-  int n = 1;                    // from 1
-  Duration time_limit = 10min;  // of each run on the host; above 0
+  int n = 1;                             // from 1
+  Duration time_limit = 10min;           // of each run on the host; above 0
+  std::uint64_t memory_limit_bytes = 0;  // likewise, resident (run_pool.hpp); 0: none
 };
 
 /// How many of the runs passed. Prints as "97 of 100 passed".

@@ -54,7 +54,12 @@ const std::map<std::string, Setter>& valued() {
       {"--out", [](O& o, const std::string& v) { o.out = v; }},
       {"--shard", parse_shard},
       {"--time-limit",
-       [](O& o, const std::string& v) { o.time_limit = seconds("--time-limit", v); }},
+       [](O& o, const std::string& v) { o.limits.time = seconds("--time-limit", v); }},
+      {"--memory-limit",
+       [](O& o, const std::string& v) {
+         o.limits.memory_bytes =
+             parsed<std::uint64_t>("--memory-limit", v, 1, 100'000'000) * 1'000'000;
+       }},
       {"--data", [](O& o, const std::string& v) { o.data.push_back(v); }},
       {"--html", [](O& o, const std::string& v) { o.html = v; }},
       {"--csv", [](O& o, const std::string& v) { o.csv = v; }},
@@ -169,6 +174,7 @@ std::string campaign_usage() {
       --retry-failed    fly again what did not pass
       --until-failure   stop at the first failure; without --runs, go on until there is one
       --time-limit S    of each run on the host (600)
+      --memory-limit MB likewise, resident (none)
       --data FILE       a file that runs read: results count as long as it stays the same
       --quiet           no progress bar
   accept DIR            the test judges the results in DIR

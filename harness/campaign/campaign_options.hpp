@@ -1,6 +1,7 @@
 /// The command line of orrery-campaign.
 #pragma once
 
+#include <orrery/harness/campaign/run_pool.hpp>
 #include <orrery/harness/kernel/simulator_only.hpp>
 #include <orrery/harness/kernel/time.hpp>
 
@@ -21,7 +22,7 @@ struct CampaignOptions {
   std::filesystem::path out = "campaign";
   std::vector<std::filesystem::path> folders = {};  // of merge, report, accept, bisect
   std::uint32_t shard = 1, shards = 1;              // from 1
-  Duration time_limit = 10min;
+  RunLimits limits = {};
   bool resume = false, retry_failed = false, until_failure = false, quiet = false;
   std::vector<std::string> data = {};   // files that the runs read
   std::vector<std::string> flags = {};  // --orrery_* that every run is given

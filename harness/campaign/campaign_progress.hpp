@@ -31,7 +31,7 @@ class CampaignProgress {
  private:
   using HostClock = std::chrono::steady_clock;
   std::uint32_t runs_ = 0, done_ = 0;
-  std::array<std::uint32_t, 6> outcomes_{};
+  std::array<std::uint32_t, kRunOutcomes> outcomes_{};
   bool visible_, shown_ = false;
   HostClock::time_point begin_ = HostClock::now(), last_{};
 };

@@ -131,14 +131,14 @@ std::string worst_json(const CampaignTable& table, const CampaignManifest& manif
 
 std::string data_json(const CampaignManifest& manifest, const MergedRuns& merged) {
   const CampaignTable table = table_of(merged);
-  std::uint64_t passed = 0, counts[6] = {};
+  std::uint64_t passed = 0, counts[kRunOutcomes] = {};
   for (const RunRecord* run : table.runs) ++counts[static_cast<std::size_t>(run->outcome)];
   passed = counts[0];
   const std::uint64_t n = std::max<std::uint64_t>(manifest.runs, table.runs.size());
   const PassRateInterval interval =
       n > 0 ? pass_rate_interval(passed, n, kConfidence) : PassRateInterval{};
   std::string outcomes;
-  for (std::size_t i = 0; i < 6; ++i) {
+  for (std::size_t i = 0; i < kRunOutcomes; ++i) {
     outcomes += (i > 0 ? ",[" : "[") + in_quotes(to_string(static_cast<RunOutcome>(i))) + "," +
                 std::to_string(counts[i]) + "]";
   }

@@ -164,7 +164,7 @@ class Runner {
   // Run 0 tells what Runs{n} says.
   void ask_how_many() {
     if (merged_.runs.find(0) == merged_.runs.end()) {
-      RunPool pool(1, options_.time_limit);
+      RunPool pool(1, options_.limits);
       pool.start(command_of(manifest_, 0));
       while (!pool.is_idle() && interrupted == 0) {
         for (RunRecord& record : pool.finished(1s)) keep(record);
@@ -213,7 +213,7 @@ class Runner {
   void fly() {
     const bool endless = options_.until_failure && options_.runs == 0;
     if (!endless) progress_.expect(progress_.done() + static_cast<std::uint32_t>(todo_.size()));
-    RunPool pool(options_.jobs, options_.time_limit);
+    RunPool pool(options_.jobs, options_.limits);
     bool more = true;
     while (more || !pool.is_idle()) {
       while (more && pool.has_room()) {

@@ -8,6 +8,7 @@
 #include <csignal>
 #include <cstring>
 #include <fcntl.h>
+#include <fstream>
 #include <poll.h>
 #include <stdexcept>
 #include <string_view>
@@ -26,6 +27,7 @@ constexpr std::size_t kMostOutput = 4096;  // its tail is kept
 constexpr int kRecordPipe = 3;             // in the child
 // Where the kernel has no pidfd (before 5.3, some sandboxes) an end is seen by looking.
 constexpr int kLookEvery_ms = 2;
+constexpr int kWeighEvery_ms = 20;
 
 [[noreturn]] void fail(const char* what) {
   throw std::runtime_error(std::string("RunPool: ") + what + ": " + std::strerror(errno));
@@ -90,6 +92,9 @@ std::vector<char*> pointers_to(std::vector<std::string>& strings) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(127);  // it died before the call
   setpgid(0, 0);                        // Ctrl-C is the runner's to handle
+  // Where memory runs out, the kernel is to take a run, not the runner.
+  const int score = open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC);
+  if (score >= 0 && write(score, "500", 3) < 0) errno = 0;
   const int nothing = open("/dev/null", O_RDONLY);
   dup2(nothing, STDIN_FILENO);
   dup2(output, STDOUT_FILENO);
@@ -118,6 +123,18 @@ std::string last_line(std::string_view text) {
   return std::string(text.substr(text.rfind('\n') + 1)).substr(0, 200);
 }
 
+// Also of one that has just ended: 0.
+std::uint64_t resident_bytes_of(pid_t pid) {
+  static const auto kPage_bytes = static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+  std::uint64_t total = 0, resident = 0;
+  std::ifstream("/proc/" + std::to_string(pid) + "/statm") >> total >> resident;
+  return resident * kPage_bytes;
+}
+
+std::string megabytes(std::uint64_t bytes) {
+  return std::to_string(bytes / 1'000'000) + " MB";
+}
+
 double seconds_of(const timeval& t) {
   return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
 }
@@ -132,6 +149,7 @@ struct RunPool::Child {
   int pidfd = -1;
   HostClock::time_point begin = HostClock::now();
   bool timed_out = false;
+  std::uint64_t too_large_bytes = 0;  // when it was ended for it
   int status = 0;
   rusage used{};
 
@@ -174,6 +192,11 @@ RunRecord RunPool::Child::result() {
     r.outcome = RunOutcome::kTimeout;
     r.failure_site = "time limit";
     r.failure_text = "not at its end after " + std::to_string(r.wall_s) + " s on the host";
+  } else if (too_large_bytes > 0) {
+    r.outcome = RunOutcome::kMemory;
+    r.failure_site = "memory limit";
+    r.failure_text = megabytes(too_large_bytes) + " resident after " + std::to_string(r.wall_s) +
+                     " s on the host";
   } else if (r.signal != 0) {
     r.outcome = is_of_the_host(r.signal) ? RunOutcome::kKilled : RunOutcome::kCrashed;
     r.failure_site = "signal " + std::to_string(r.signal) + ", " + strsignal(r.signal);
@@ -202,13 +225,13 @@ std::string replay_command_of(const RunCommand& command) {
   return text;
 }
 
-RunPool::RunPool(int jobs, Duration time_limit)
-    : jobs_(static_cast<std::size_t>(jobs)), time_limit_(time_limit) {
+RunPool::RunPool(int jobs, const RunLimits& limits)
+    : jobs_(static_cast<std::size_t>(jobs)), limits_(limits) {
   if (jobs < 1) {
     throw std::invalid_argument("RunPool: jobs = " + std::to_string(jobs) + "; accepted: from 1");
   }
-  if (time_limit <= Duration::zero()) {
-    throw std::invalid_argument("RunPool: time_limit = " + to_string(time_limit) +
+  if (limits.time <= Duration::zero()) {
+    throw std::invalid_argument("RunPool: time_limit = " + to_string(limits.time) +
                                 "; accepted: above 0 s");
   }
 }
@@ -246,22 +269,33 @@ void RunPool::listen(Duration at_most) {
   auto until = HostClock::now() + at_most;
   bool look = false;
   for (const auto& child : children_) {
-    until = std::min(until, child->begin + time_limit_);
+    until = std::min(until, child->begin + limits_.time);
     look = look || child->pidfd < 0;
     if (child->pidfd >= 0) asked.push_back({child->pidfd, POLLIN, 0});
     asked.push_back({child->output_pipe.read, POLLIN, 0});
     asked.push_back({child->record_pipe.read, POLLIN, 0});
   }
   const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - HostClock::now()).count();
-  const auto wait_ms = std::clamp<std::int64_t>(left, 0, look ? kLookEvery_ms : 1000);
+  const int most_ms = look ? kLookEvery_ms : limits_.memory_bytes > 0 ? kWeighEvery_ms : 1000;
+  const auto wait_ms = std::clamp<std::int64_t>(left, 0, most_ms);
   poll(asked.data(), asked.size(), static_cast<int>(wait_ms));
+}
+
+// Whether it may go on: within its limits.
+bool RunPool::may_go_on(Child& child) const {
+  child.timed_out = HostClock::now() >= child.begin + limits_.time;
+  if (child.timed_out) return false;
+  if (limits_.memory_bytes == 0) return true;
+  const std::uint64_t bytes = resident_bytes_of(child.pid);
+  if (bytes <= limits_.memory_bytes) return true;
+  child.too_large_bytes = bytes;
+  return false;
 }
 
 bool RunPool::has_ended(Child& child) {
   child.take_output();
   pid_t ended = wait4(child.pid, &child.status, WNOHANG, &child.used);
-  if (ended == 0 && HostClock::now() >= child.begin + time_limit_) {
-    child.timed_out = true;
+  if (ended == 0 && !may_go_on(child)) {
     kill(-child.pid, SIGKILL);
     kill(child.pid, SIGKILL);  // it may not have its group yet
     while ((ended = wait4(child.pid, &child.status, 0, &child.used)) < 0 && errno == EINTR) {

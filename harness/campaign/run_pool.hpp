@@ -21,6 +21,14 @@ struct RunCommand {
   std::string name = {};                // argv[0], for replay commands; empty: program
 };
 
+/// Of each run, on the host.
+struct RunLimits {
+  Duration time = 10min;  // above 0
+  /// Resident, looked at 50 times a second: what grows by a gigabyte in between goes that far. Of
+  /// the run's own process. 0: none.
+  std::uint64_t memory_bytes = 0;
+};
+
 /// The command that repeats a run in the shell, on one line.
 std::string replay_command_of(const RunCommand& command);
 
@@ -30,10 +38,9 @@ std::string replay_command_of(const RunCommand& command);
 /// nothing does not pass.
 class RunPool {
  public:
-  /// @param jobs        Runs at a time, at least 1.
-  /// @param time_limit  Of each on the host; above 0.
+  /// @param jobs  Runs at a time, at least 1.
   /// @throws std::invalid_argument  either outside its range.
-  RunPool(int jobs, Duration time_limit);
+  RunPool(int jobs, const RunLimits& limits);
   /// Ends those that are going on.
   ~RunPool();
   RunPool(const RunPool&) = delete;
@@ -53,10 +60,11 @@ class RunPool {
  private:
   struct Child;
   void listen(Duration at_most);
+  bool may_go_on(Child& child) const;
   bool has_ended(Child& child);
 
   std::size_t jobs_;
-  Duration time_limit_;
+  RunLimits limits_;
   std::vector<std::unique_ptr<Child>> children_;
 };
 

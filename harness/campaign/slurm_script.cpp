@@ -65,7 +65,10 @@ std::string slurm_script(const CampaignOptions& o, const std::string& runner, st
           " --filter " + quoted_for_shell(o.filter) + " --runs " + std::to_string(o.runs) +
           " --seed " + std::to_string(o.seed) + " --out " + quoted_for_shell(out) +
           " \\\n  --shard \"$SLURM_ARRAY_TASK_ID/" + n + "\" --resume --quiet -j " +
-          std::to_string(o.processors) + " --time-limit " + to_text(to_seconds(o.time_limit));
+          std::to_string(o.processors) + " --time-limit " + to_text(to_seconds(o.limits.time));
+  if (o.limits.memory_bytes > 0) {
+    text += " --memory-limit " + std::to_string(o.limits.memory_bytes / 1'000'000);
+  }
   for (const std::string& file : o.data) text += " --data " + quoted_for_shell(file);
   if (!o.flags.empty()) text += " --";
   for (const std::string& flag : o.flags) text += " " + quoted_for_shell(flag);

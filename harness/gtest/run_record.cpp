@@ -22,8 +22,8 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kPipeVariable = "ORRERY_RUN_RECORD";
 constexpr int kVersion = 1;
 constexpr std::size_t kMostText = 1000;  // of a failure
-constexpr std::array<const char*, 6> kOutcomes = {"passed",  "failed", "crashed",
-                                                  "timeout", "killed", "error"};
+constexpr std::array<const char*, kRunOutcomes> kOutcomes = {
+    "passed", "failed", "crashed", "timeout", "memory", "killed", "error"};
 
 double number_or_nan(const Json& value) {
   return value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN();

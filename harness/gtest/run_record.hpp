@@ -3,6 +3,7 @@
 
 #include <orrery/harness/kernel/simulator_only.hpp>
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -24,9 +25,11 @@ enum class RunOutcome : std::uint8_t {
   kFailed,   // an assertion, or flight code crashed and the test did not allow it
   kCrashed,  // the test program itself ended amid the test: by a signal, or a sanitizer's exit
   kTimeout,  // passed its time limit on the host
+  kMemory,   // passed its memory limit on the host
   kKilled,   // by a signal that others send: SIGKILL, SIGTERM ...
   kError     // ended without having run anything, or could not be started
 };
+constexpr std::size_t kRunOutcomes = 7;
 const char* to_string(RunOutcome outcome);
 std::optional<RunOutcome> outcome_of(std::string_view word);
 constexpr bool is_result(RunOutcome outcome) {

@@ -66,6 +66,16 @@ TEST(Host, AHangIsNoResult) {
     if (run.index == 1) std::this_thread::sleep_for(std::chrono::seconds(60));
   });
 }
+// Up to 1 GB, 20 MB at a time.
+TEST(Host, AHogIsNoResult) {
+  fly_campaign(Runs{.n = 3, .memory_limit_bytes = 400'000'000}, [](RunId run) {
+    std::vector<std::string> kept;
+    for (int i = 0; run.index == 1 && i < 50; ++i) {
+      kept.emplace_back(std::size_t{20'000'000}, 'x');
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+  });
+}
 TEST(Host, AKillIsNoResult) {
   fly_campaign(Runs{3}, [](RunId run) {
     if (run.index == 1) std::raise(SIGKILL);

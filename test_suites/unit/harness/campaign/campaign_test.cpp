@@ -71,6 +71,7 @@ TEST(FlyCampaignTest, ARunWithoutAResultFailsIt) {
     const char *test, *why;
   } rows[] = {{"AHangIsNoResult", "run 1 (seed 2): timeout"},
               {"AKillIsNoResult", "run 1 (seed 2): killed, signal 9"},
+              {"AHogIsNoResult", "run 1 (seed 2): memory, memory limit"},
               {"AnEarlyExitIsNoResult", "run 1 (seed 2): error, left no record, exit code 0"},
               {"ASkipIsNoResult", "run 1 (seed 2): error, left no record, exit code 0"},
               {"ABodyThatFliesNothingIsNoResult",

@@ -179,11 +179,20 @@ TEST_F(CampaignToolTest, ATimeLimitCostsOneRun) {
   EXPECT_THAT(ended.output, AllOf(HasSubstr("passed 2, timeout 1"), HasSubstr("without a result")));
 }
 
+// Run 1 takes up to 1 GB; the others stay below 100 MB, under a sanitizer too.
+TEST_F(CampaignToolTest, AMemoryLimitCostsOneRun) {
+  const Ended ended = campaign(run("Host.AHogIsNoResult") + "--memory-limit 300 -j2");
+  EXPECT_EQ(ended.code, 1);
+  EXPECT_THAT(ended.output, AllOf(HasSubstr("passed 2, memory 1"), HasSubstr("without a result"),
+                                  HasSubstr("1 memory: memory limit")));
+  EXPECT_EQ(read_runs(out()).runs.at(1).outcome, RunOutcome::kMemory);
+}
+
 TEST_F(CampaignToolTest, SaysWhatIsWrongWithItsArguments) {
   for (const char* arguments :
        {"fly", "run", "run x", "run x --filter 'A.*'", "run x --filter A.B -j0",
-        "run x --filter A.B --shard 3/2", "run x --filter A.B --bogus",
-        "run x --filter A.B -- --gtest_repeat=2", "report"}) {
+        "run x --filter A.B --shard 3/2", "run x --filter A.B --memory-limit 0",
+        "run x --filter A.B --bogus", "run x --filter A.B -- --gtest_repeat=2", "report"}) {
     EXPECT_EQ(campaign(arguments).code, 2) << arguments;
   }
   EXPECT_THAT(campaign("run /nowhere/x --filter A.B").output, HasSubstr("/nowhere/x"));
