@@ -94,6 +94,19 @@ void add_targets(Flags& flags, std::string_view text) {
   }
 }
 
+PaceSetting parse_pace(std::string_view text) {
+  const std::size_t comma = text.find(',');
+  const std::string_view rate = text.substr(0, comma);
+  PaceSetting pace;
+  const auto [end, error] = std::from_chars(rate.data(), rate.data() + rate.size(), pace.rate);
+  if (error != std::errc() || end != rate.data() + rate.size() || !(pace.rate >= 0) ||
+      pace.rate > 1e9) {
+    refuse("pace", text, "RATE[,DEADLINE], simulated seconds per second from 0 to 1e9");
+  }
+  if (comma != std::string_view::npos) pace.deadline = parse_span("pace", text.substr(comma + 1));
+  return pace;
+}
+
 bool parse_switch(const std::string& name, std::string_view text) {
   if (text.empty() || text == "1" || text == "true") return true;
   if (text == "0" || text == "false") return false;
@@ -160,6 +173,7 @@ const std::map<std::string, Setter>& setters() {
          f.shuffle_ties = parse_integer("shuffle_ties", v, 0, kSeedEnd - 1);
        }},
       {"target", add_targets},
+      {"pace", [](Flags& f, std::string_view v) { f.pace = parse_pace(v); }},
       {"progress", [](Flags& f, std::string_view v) { f.progress = parse_switch("progress", v); }},
   };
   return kSetters;

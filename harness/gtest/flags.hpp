@@ -4,6 +4,7 @@
 
 #include <orrery/harness/kernel/simulator_only.hpp>
 #include <orrery/harness/kernel/time.hpp>
+#include <orrery/harness/remote/pace.hpp>
 #include <orrery/harness/remote/target_address.hpp>
 
 #include <cstdint>
@@ -51,6 +52,7 @@ struct Flags {
     TargetAddress address;
   };
   std::vector<Target> targets = {};
+  std::optional<PaceSetting> pace = {};  // --orrery_pace=RATE[,DEADLINE] (1, or 0.5,20ms); 0: none
   /// --orrery_progress: a line per twentieth of a run, and a result table. Empty: one line that
   /// changes, on a terminal alone; false: never.
   std::optional<bool> progress = {};

@@ -44,7 +44,7 @@ Duration Pace::wait_for(SimTime t) {
   const std::int64_t due_ns = begin_host_ns_ + static_cast<std::int64_t>(since_begin_ns);
   if (due_ns > host_now_ns()) sleep_until(due_ns);
   const Duration late{std::max<std::int64_t>(0, host_now_ns() - due_ns)};
-  ++figures_.instants;
+  ++figures_.events;
   sum_ += late;
   figures_.most_lateness = std::max(figures_.most_lateness, late);
   if (missed(late)) ++figures_.missed;
@@ -53,10 +53,17 @@ Duration Pace::wait_for(SimTime t) {
 
 PaceFigures Pace::figures() const {
   PaceFigures figures = figures_;
-  if (figures.instants > 0) {
-    figures.mean_lateness = sum_ / static_cast<std::int64_t>(figures.instants);
+  if (figures.events > 0) {
+    figures.mean_lateness = sum_ / static_cast<std::int64_t>(figures.events);
   }
   return figures;
+}
+
+std::string to_string(const Pace& pace) {
+  const PaceFigures f = pace.figures();
+  return to_text(pace.setting().rate) + " x real time: " + std::to_string(f.events) + " events, " +
+         to_string(f.mean_lateness) + " late on average, " + to_string(f.most_lateness) +
+         " at most; " + std::to_string(f.missed) + " missed " + to_string(pace.setting().deadline);
 }
 
 }  // namespace orrery

@@ -4,6 +4,7 @@
 #include <orrery/harness/kernel/time.hpp>
 
 #include <cstdint>
+#include <string>
 
 namespace orrery {
 
@@ -16,8 +17,8 @@ struct PaceSetting {
 
 /// How late events began, in host time.
 struct PaceFigures {
-  std::uint64_t instants = 0;  // waited for
-  std::uint64_t missed = 0;    // of them later than the deadline
+  std::uint64_t events = 0;  // waited for
+  std::uint64_t missed = 0;  // of them later than the deadline
   Duration mean_lateness{0}, most_lateness{0};
 };
 
@@ -32,6 +33,7 @@ class Pace {
   Duration wait_for(SimTime t);
   bool missed(Duration lateness) const { return lateness > setting_.deadline; }
   PaceFigures figures() const;
+  const PaceSetting& setting() const { return setting_; }
 
  private:
   PaceSetting setting_;
@@ -40,5 +42,8 @@ class Pace {
   PaceFigures figures_;
   Duration sum_{0};
 };
+
+/// "1 x real time: 1204 events, 0.06 ms late on average, 2.1 ms at most; 0 missed 10 ms"
+std::string to_string(const Pace& pace);
 
 }  // namespace orrery

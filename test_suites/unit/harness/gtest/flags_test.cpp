@@ -42,6 +42,18 @@ TEST(FlagsTest, TimesTakeSecondsOrAUnit) {
   EXPECT_EQ(parse_flags({"--orrery_record=events"}, {}).record.mode, RecordSetting::Mode::kEvents);
 }
 
+TEST(FlagsTest, PaceTakesARateAndADeadline) {
+  EXPECT_FALSE(parse_flags({}, {}).pace.has_value());
+  EXPECT_EQ(parse_flags({"--orrery_pace=1"}, {}).pace->rate, 1);
+  EXPECT_EQ(parse_flags({"--orrery_pace=1"}, {}).pace->deadline, 10ms);
+  const Flags f = parse_flags({"--orrery_pace=0.5,20ms"}, {});
+  EXPECT_EQ(f.pace->rate, 0.5);
+  EXPECT_EQ(f.pace->deadline, 20ms);
+  EXPECT_THAT([] { parse_flags({"--orrery_pace=1,soon"}, {}); },
+              ThrowsMessage<std::invalid_argument>(
+                  AllOf(HasSubstr("--orrery_pace=soon"), HasSubstr("a time"))));
+}
+
 TEST(FlagsTest, LogTakesALevelAndASpacecraft) {
   const Flags f = parse_flags({"--orrery_log=warning,deputy"}, {});
   EXPECT_EQ(f.log.level, 2);
@@ -52,7 +64,8 @@ TEST(FlagsTest, NonsenseIsNamed) {
   for (const char* flag :
        {"--orrery_seed=-1", "--orrery_seed=1x", "--orrery_seed=", "--orrery_runs=0",
         "--orrery_out=", "--orrery_record=0", "--orrery_record=nan", "--orrery_break_at=-3",
-        "--orrery_break_at=1e300", "--orrery_log=loud", "--orrery_progress=maybe"}) {
+        "--orrery_break_at=1e300", "--orrery_log=loud", "--orrery_progress=maybe",
+        "--orrery_pace=-1", "--orrery_pace=fast"}) {
     EXPECT_THAT([flag] { parse_flags({flag}, {}); },
                 ThrowsMessage<std::invalid_argument>(HasSubstr(flag)))
         << flag;

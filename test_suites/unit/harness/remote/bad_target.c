@@ -112,6 +112,7 @@ static void misbehave(unsigned sequence) {
   if (is("stopped")) raise(SIGSTOP);
   if (is("exits")) exit(3);
   if (is("silent")) sleep(1000);
+  if (is("late")) sleep(3);
   if (is("garbage")) {
     memset(request, 0x5A, sizeof request);
     for (;;) send_all(request, sizeof request);

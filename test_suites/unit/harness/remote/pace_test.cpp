@@ -23,7 +23,7 @@ TEST(PaceTest, NothingBeginsBeforeItsTime) {
   EXPECT_GE(HostClock::now() - begin, 10ms);
   pace.wait_for(from_ns(0) + 3s);
   EXPECT_GE(HostClock::now() - begin, 30ms);
-  EXPECT_EQ(pace.figures().instants, 3u);
+  EXPECT_EQ(pace.figures().events, 3u);
 }
 
 TEST(PaceTest, WhoAnswersTooLateMissesTheDeadline) {

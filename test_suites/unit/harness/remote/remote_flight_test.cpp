@@ -212,6 +212,7 @@ INSTANTIATE_TEST_SUITE_P(
                     BadTarget{"exits", "ended with exit status 3"},
                     BadTarget{"stopped", "did not answer within 1"},
                     BadTarget{"silent", "did not answer within 1"},
+                    BadTarget{"late", "did not answer within 1"},
                     BadTarget{"half a frame", "did not answer within 1"},
                     BadTarget{"garbage", "sent bytes that begin no frame"},
                     BadTarget{"version", "sent frames of ABI version 2; this program speaks 1"},
