@@ -48,7 +48,9 @@ TEST(ChildProcess, StartsWhileAnotherThreadIsInAHook) {
   while (!is_through && (id == 0 || !sleeps(id))) std::this_thread::yield();
   const bool looks_up = !is_through;
 
-  if (looks_up) EXPECT_EQ(run_child(command).exit_code, 0);
+  if (looks_up) {
+    EXPECT_EQ(run_child(command).exit_code, 0);
+  }
   EXPECT_EQ(write(may_end[1], &byte, 1), 1);
   in_hook.join();
   loader.join();
