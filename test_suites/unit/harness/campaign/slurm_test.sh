@@ -101,14 +101,20 @@ for _ in $(seq 240); do
 done
 daemon=$(cat "$dir/slurmd.n1.pid")
 descendants() { for child in $(pgrep -P "$1"); do echo "$child"; descendants "$child"; done; }
-steps=$(pgrep -f "slurmstepd: \[[0-9]+\..*\]" || true)
+# Between two tasks the node runs nothing, and a step daemon lives on after its task: look until one runs.
 victims=
-for step in $steps; do
-  # A step daemon has no parent any more; its spool folder tells whose it is.
-  tr '\0' '\n' <"/proc/$step/environ" 2>/dev/null | grep -q "^SLURM_CONF=$dir" || continue
-  ls -l "/proc/$step/cwd" "/proc/$step/fd" 2>/dev/null | grep -q "spool.n1\|slurmd.n1" || continue
-  victims="$victims $(descendants "$step") $step"
+for _ in $(seq 400); do
+  for step in $(pgrep -f "slurmstepd: \[[0-9]+\..*\]" || true); do
+    # A step daemon has no parent any more; its spool folder tells whose it is.
+    tr '\0' '\n' <"/proc/$step/environ" 2>/dev/null | grep -q "^SLURM_CONF=$dir" || continue
+    ls -l "/proc/$step/cwd" "/proc/$step/fd" 2>/dev/null | grep -q "spool.n1\|slurmd.n1" || continue
+    begun=$(descendants "$step")
+    [ -z "$begun" ] || victims="$victims $begun $step"
+  done
+  [ -z "$victims" ] || break
+  sleep 0.05
 done
+[ -n "$victims" ] || fail "node n1 runs no task"
 kill -9 "$daemon" $victims
 echo "node n1 killed after $done_runs runs: slurmd $daemon, and$victims"
 # Slurm is told, as a health check would: it would see it after SlurmdTimeout, which is long here lest a
