@@ -73,7 +73,8 @@ function(orrery_cross_library name processor)
 endfunction()
 
 # Appends to `objects` those of the sources of `target`, seen with its own include folders. A static
-# library that several flight libraries link is compiled once.
+# library that several flight libraries link is compiled once; C++ sources with the same UNITY_GROUP
+# are compiled as one.
 function(orrery_cross_objects name processor target)
   get_property(compiled GLOBAL PROPERTY ORRERY_CROSS_OBJECTS_${target}.${processor})
   if(compiled)
@@ -81,6 +82,7 @@ function(orrery_cross_objects name processor target)
     return()
   endif()
   set(compiled "")
+  set(groups "")
   set(includes "$<TARGET_PROPERTY:${target},INCLUDE_DIRECTORIES>")
   set(place ${CMAKE_CURRENT_BINARY_DIR}/CMakeFiles/${name}.${processor})
   get_target_property(folder ${target} SOURCE_DIR)
@@ -90,29 +92,48 @@ function(orrery_cross_objects name processor target)
     if(NOT source MATCHES "\\.(c|cc|cpp|cxx)$")
       continue()
     endif()
-    cmake_path(GET source FILENAME file)
-    string(SHA1 hash ${source})
-    string(SUBSTRING ${hash} 0 8 hash)
-    set(object ${place}/${hash}_${file}.o)
-    set(compiler ${ORRERY_CROSS_CC_${processor}})
-    if(NOT source MATCHES "\\.c$")
-      # Notes that GCC 7 passes some classes otherwise than GCC 6 did: all of it is compiled here.
-      set(compiler ${ORRERY_CROSS_CXX_${processor}} -std=c++17 -Wno-psabi)
+    get_source_file_property(group ${source} TARGET_DIRECTORY ${target} UNITY_GROUP)
+    if(group AND NOT source MATCHES "\\.c$")
+      list(APPEND groups ${group})
+      list(APPEND group_${group} ${source})
+    else()
+      orrery_cross_object(${source})
     endif()
-    add_custom_command(OUTPUT ${object}
-      COMMAND ${CMAKE_COMMAND} -E make_directory ${place}
-      COMMAND ${compiler} -O2 -g -fPIC -fvisibility=hidden ${ORRERY_NUMERIC_FLAG_LIST}
-        "-I$<JOIN:${includes},;-I>" -DORRERY_FLIGHT_BUILD
-        -MMD -MF ${object}.d -c ${source} -o ${object}
-      DEPENDS ${source} DEPFILE ${object}.d
-      COMMAND_EXPAND_LISTS VERBATIM
-      COMMENT "Building ${processor} object of ${name}: ${file}")
-    list(APPEND compiled ${object})
+  endforeach()
+  list(REMOVE_DUPLICATES groups)
+  foreach(group IN LISTS groups)
+    list(TRANSFORM group_${group} REPLACE "(.+)" "#include \"\\1\"")
+    list(JOIN group_${group} "\n" text)
+    file(CONFIGURE OUTPUT ${place}/${target}_${group}.cpp CONTENT "${text}\n" @ONLY)
+    orrery_cross_object(${place}/${target}_${group}.cpp)
   endforeach()
   set_property(GLOBAL PROPERTY ORRERY_CROSS_OBJECTS_${target}.${processor} ${compiled})
   set_property(GLOBAL PROPERTY ORRERY_CROSS_MAKER_${target}.${processor} ${name}.${processor})
   set(objects ${objects} ${compiled} PARENT_SCOPE)
 endfunction()
+
+# Of one source, for orrery_cross_objects: appends to its `compiled`.
+macro(orrery_cross_object path)
+  set(source ${path})
+  cmake_path(GET source FILENAME file)
+  string(SHA1 hash ${source})
+  string(SUBSTRING ${hash} 0 8 hash)
+  set(object ${place}/${hash}_${file}.o)
+  set(compiler ${ORRERY_CROSS_CC_${processor}})
+  if(NOT file MATCHES "\\.c$")
+    # Notes that GCC 7 passes some classes otherwise than GCC 6 did: all of it is compiled here.
+    set(compiler ${ORRERY_CROSS_CXX_${processor}} -std=c++17 -Wno-psabi)
+  endif()
+  add_custom_command(OUTPUT ${object}
+    COMMAND ${CMAKE_COMMAND} -E make_directory ${place}
+    COMMAND ${compiler} -O2 -g -fPIC -fvisibility=hidden ${ORRERY_NUMERIC_FLAG_LIST}
+      "-I$<JOIN:${includes},;-I>" -DORRERY_FLIGHT_BUILD
+      -MMD -MF ${object}.d -c ${source} -o ${object}
+    DEPENDS ${source} DEPFILE ${object}.d
+    COMMAND_EXPAND_LISTS VERBATIM
+    COMMENT "Building ${processor} object of ${name}: ${file}")
+  list(APPEND compiled ${object})
+endmacro()
 
 # Once per processor: orrery-flight-target with its simulated heap. Once: the plugin that counts
 # instructions. The sources lie beside this file where Orrery is installed.
