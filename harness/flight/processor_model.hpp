@@ -14,9 +14,8 @@ namespace orrery {
 /// Valid for  code whose mix of instructions is that of the code which CPI was found with. Caches,
 ///            pipelines and memory are in CPI as a mean, so a worst case is not modelled.
 /// CPI        those of processor_models() are estimates from what is published of the processor,
-/// within
-///            a factor of two; one measurement on the hardware gives the true one for one's own
-///            code (harness/remote/README.md, Calibration).
+///            within a factor of two; one measurement on the hardware gives the true one for one's
+///            own code (harness/remote/README.md, Calibration).
 struct ProcessorModel {
   std::string name = {};              // "arm1176 700 MHz"
   double clock_Hz = 1e9;              // above 0
