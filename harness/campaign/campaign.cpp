@@ -111,6 +111,7 @@ struct FlownRuns {
 };
 
 FlownRuns flown_elsewhere(const testing::TestInfo& test) {
+  internal::note_runs_elsewhere();
   const std::string& folder = flags().campaign;
   const std::optional<CampaignManifest> manifest = read_manifest(folder);
   if (!manifest || manifest->test != name_of(test)) {
@@ -126,6 +127,7 @@ FlownRuns flown_elsewhere(const testing::TestInfo& test) {
 }
 
 FlownRuns fly(const testing::TestInfo& test, const Runs& runs) {
+  internal::note_runs_elsewhere();
   FlownRuns flown;
   flown.n = static_cast<std::uint32_t>(runs.n);
   const auto store = store_of(test, runs);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
@@ -139,7 +140,8 @@ const std::map<std::string, Setter>& setters() {
          const auto parsed = equals == std::string_view::npos
                                  ? std::from_chars_result{v.data(), std::errc::invalid_argument}
                                  : std::from_chars(v.data() + equals + 1, end, value);
-         if (parsed.ec != std::errc() || parsed.ptr != end) {
+         if (parsed.ec != std::errc() || parsed.ptr != end || equals == 0 ||
+             !std::isfinite(value)) {
            refuse("set", v, "NAME=NUMBER, as in deputy/mass_kg=11.2");
          }
          f.set[std::string(v.substr(0, equals))] = value;

@@ -37,6 +37,7 @@ class Listener : public testing::EmptyTestEventListener {
     explained_ = true;  // what fails from here on brings its own commands
     internal::end_determinism_check(test);
     for (const EndOfTest& end : ends_of_tests()) end(test);
+    internal::check_settings(test);
     internal::end_requirements(test);
     internal::end_run_record(test);
     set_current_test({});

@@ -12,6 +12,7 @@
 #include <cstdlib>
 #include <fcntl.h>
 #include <limits>
+#include <set>
 #include <unistd.h>
 
 namespace orrery {
@@ -59,6 +60,7 @@ struct Collector {
   int pipe = -1;
   RunRecord record;
   std::string crash_site;
+  bool flies_elsewhere = false;
 };
 
 Collector& collector() {
@@ -217,6 +219,7 @@ bool leaves_run_record() {
 
 void begin_run_record(const testing::TestInfo& test) {
   collector().crash_site.clear();
+  collector().flies_elsewhere = false;
   RunRecord& record = collector().record = {};
   record.test = std::string(test.test_suite_name()) + "." + test.name();
   record.run = flags().run.value_or(0);
@@ -262,6 +265,27 @@ void note_failure(const char* file, int line, std::string_view text) {
     record.failure_site = without_numbers(text);
   }
   record.failure_text = shortened(text, kMostText);
+}
+
+void note_runs_elsewhere() {
+  collector().flies_elsewhere = true;
+}
+
+void check_settings(const testing::TestInfo& test) {
+  if (collector().flies_elsewhere || test.result()->Skipped()) return;
+  const std::vector<DrawnDispersion>& drawn = collector().record.dispersions;
+  if (drawn.empty() && test.result()->Failed()) return;  // it did not come that far
+  std::string known;
+  std::set<std::string, std::less<>> names;
+  for (const DrawnDispersion& one : drawn) {
+    if (names.insert(one.name).second) known += (known.empty() ? "" : ", ") + one.name;
+  }
+  for (const auto& [name, value] : flags().set) {
+    if (names.count(name) > 0) continue;
+    ADD_FAILURE() << "--orrery_set=" << name << "=" << to_text(value)
+                  << ": this test draws no dispersion of that name; it draws "
+                  << (known.empty() ? "none" : known);
+  }
 }
 
 void note_campaign_run(std::uint32_t run, std::uint64_t seed, std::uint32_t runs) {

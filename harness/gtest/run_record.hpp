@@ -98,6 +98,11 @@ void note_world_end(const std::string& fingerprint, double simulated_s, std::uin
 void note_crash_site(const std::string& site);
 /// The first failure counts. @param file  null or empty: not known.
 void note_failure(const char* file, int line, std::string_view text);
+/// The runs of this test are flown by others: by its children, or they have been.
+void note_runs_elsewhere();
+/// A value of --orrery_set that no dispersion of this test has taken fails it, and names those
+/// there are.
+void check_settings(const testing::TestInfo& test);
 /// fly_campaign() says which run this is, and of how many.
 void note_campaign_run(std::uint32_t run, std::uint64_t seed, std::uint32_t runs);
 /// Writes the line, unless the test was skipped.

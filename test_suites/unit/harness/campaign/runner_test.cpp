@@ -1,5 +1,6 @@
 // orrery-campaign run and accept, as programs.
 #include <orrery/harness/campaign/bisection.hpp>
+#include <orrery/harness/campaign/campaign_statistics.hpp>
 #include <orrery/harness/campaign/run_store.hpp>
 #include <orrery/harness/campaign/slurm_script.hpp>
 #include <orrery/harness/gtest/child_process.hpp>
@@ -186,6 +187,107 @@ TEST_F(CampaignToolTest, AMemoryLimitCostsOneRun) {
   EXPECT_THAT(ended.output, AllOf(HasSubstr("passed 2, memory 1"), HasSubstr("without a result"),
                                   HasSubstr("1 memory: memory limit")));
   EXPECT_EQ(read_runs(out()).runs.at(1).outcome, RunOutcome::kMemory);
+}
+
+class FlightCampaignTest : public CampaignToolTest {
+ protected:
+  std::string run_flying(const char* test) const {
+    return "run " FAILING_PROGRAM " --filter FlightCampaign." + std::string(test) + " --out " +
+           out() + " ";
+  }
+};
+
+// Both crashes are one line of the report, under the function that flight code crashed in.
+TEST_F(FlightCampaignTest, CrashesOfFlightCodeAreGroupedByTheirSite) {
+  EXPECT_EQ(campaign(run_flying("EveryOtherCrashes")).code, 0);
+  const std::vector<FailureGroup> groups = failure_groups_of(table_of(read_runs(out())));
+  ASSERT_EQ(groups.size(), 1u);
+  EXPECT_EQ(groups[0].outcome, "failed");
+  EXPECT_EQ(groups[0].runs, (std::vector<std::uint32_t>{1, 3}));
+  EXPECT_THAT(groups[0].site, AllOf(HasSubstr("deputy"), HasSubstr("input")));
+  EXPECT_THAT(groups[0].text, HasSubstr("Aborted raised"));
+}
+
+TEST_F(FlightCampaignTest, IsRefusedWhereAFlightLibraryHasChanged) {
+  const std::string libraries = out("libraries");
+  const std::string library = libraries + "/libfixture_beacon.so";
+  std::filesystem::create_directory(libraries);
+  std::filesystem::copy_file(FIXTURE_BEACON, library);
+  setenv("ORRERY_FLIGHT_PATH", libraries.c_str(), 1);
+  const std::string command = run_flying("EveryOtherCrashes");
+  EXPECT_EQ(campaign(command + "--runs 3").code, 0);
+  EXPECT_EQ(campaign(command + "--runs 4 --resume").code, 0);
+  std::ofstream(library, std::ios::app | std::ios::binary) << 'x';  // still flies
+  for (const char* way : {"--resume", "--retry-failed"}) {
+    const Ended refused = campaign(command + way);
+    EXPECT_EQ(refused.code, 2) << way;
+    EXPECT_THAT(refused.output, HasSubstr("with another flight library: " + library)) << way;
+  }
+  unsetenv("ORRERY_FLIGHT_PATH");
+  EXPECT_EQ(lines_in(out()), 4u);
+}
+
+TEST_F(FlightCampaignTest, IsRefusedWhereADispersionOrAFlagHasChanged) {
+  const std::string command = run_flying("HeavyOnesFail");
+  campaign(command + "--runs 3");
+  EXPECT_THAT(campaign(command + "--runs 3 --resume -- --orrery_set=deputy/mass_kg=11").output,
+              HasSubstr("flags are others"));
+  setenv("CAMPAIGN_SIGMA_KG", "0.25", 1);
+  const Ended refused = campaign(command + "--runs 6 --resume");
+  unsetenv("CAMPAIGN_SIGMA_KG");
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(
+      refused.output,
+      HasSubstr("the dispersion of deputy/mass_kg is Normal(11, 0.25), was Normal(11, 0.5)"));
+  EXPECT_EQ(lines_in(out()), 3u);
+}
+
+// A typing mistake must not pass for a value that changes nothing.
+TEST_F(FlightCampaignTest, AValueForWhatIsNotDispersedIsRefusedByName) {
+  const std::string program =
+      FAILING_PROGRAM " --gtest_filter=FlightCampaign.HeavyOnesFail --orrery_run=0 --orrery_set=";
+  EXPECT_EQ(shell(program + "deputy/mass_kg=11").code, 0);
+  const Ended unknown = shell(program + "deputy/mass=11");
+  EXPECT_EQ(unknown.code, 1);
+  EXPECT_THAT(unknown.output,
+              HasSubstr("--orrery_set=deputy/mass=11: this test draws no dispersion "
+                        "of that name; it draws deputy/mass_kg"));
+  const Ended wrong = shell(program + "deputy/mass_kg=-5");
+  EXPECT_EQ(wrong.code, 1);
+  EXPECT_THAT(wrong.output, AllOf(HasSubstr("mass_kg"), HasSubstr("-5")));
+  for (const char* text : {"deputy/mass_kg=nan", "deputy/mass_kg=heavy", "deputy/mass_kg", "=3"}) {
+    const Ended malformed = shell(program + text);
+    EXPECT_EQ(malformed.code, 2) << text;
+    EXPECT_THAT(malformed.output, HasSubstr("expected NAME=NUMBER")) << text;
+  }
+  // The runs are refused, not the program that flies them.
+  const Ended all =
+      shell(FAILING_PROGRAM " --gtest_filter=FlightCampaign.HeavyOnesFail --orrery_set=mass_kg=11");
+  EXPECT_THAT(all.output, HasSubstr("0 of 8 runs passed"));
+}
+
+// The limit in the test is 11.25 kg; the interval some tenths, of which a thousandth is asked.
+TEST_F(FlightCampaignTest, BisectionFindsTheValueAtWhichARunBeginsToFail) {
+  campaign(run_flying("HeavyOnesFail"));
+  std::uint32_t failed = 0;
+  for (const auto& [index, record] : read_runs(out()).runs) {
+    if (record.outcome == RunOutcome::kFailed) failed = index;
+  }
+  const std::string bisects =
+      "bisect " + out() + " --run " + std::to_string(failed) + " --parameter ";
+  const Ended ended = campaign(bisects + "deputy/mass_kg");
+  EXPECT_EQ(ended.code, 0) << ended.output;
+  double passes_kg = 0, fails_kg = 0;
+  const std::size_t at = ended.output.find("passes at ");
+  ASSERT_NE(at, std::string::npos) << ended.output;
+  ASSERT_EQ(
+      std::sscanf(ended.output.c_str() + at, "passes at %lf, fails at %lf", &passes_kg, &fails_kg),
+      2);
+  EXPECT_LT(passes_kg, 11.25);
+  EXPECT_GE(fails_kg, 11.25);
+  EXPECT_LT(fails_kg - passes_kg, 0.002);
+  EXPECT_THAT(campaign(bisects + "deputy/mass").output,
+              HasSubstr("no dispersion 'deputy/mass'; there are deputy/mass_kg"));
 }
 
 TEST_F(CampaignToolTest, SaysWhatIsWrongWithItsArguments) {
