@@ -101,22 +101,32 @@ for _ in $(seq 240); do
 done
 daemon=$(cat "$dir/slurmd.n1.pid")
 descendants() { for child in $(pgrep -P "$1"); do echo "$child"; descendants "$child"; done; }
-# Between two tasks the node runs nothing, and a step daemon lives on after its task: look until one runs.
-victims=
-for _ in $(seq 400); do
-  for step in $(pgrep -f "slurmstepd: \[[0-9]+\..*\]" || true); do
+# The step daemons of n1, and what they run.
+steps_of_n1() {
+  for step in $(pgrep -f "slurmstepd: \[[0-9]+\..*\]"); do
     # A step daemon has no parent any more; its spool folder tells whose it is.
     tr '\0' '\n' <"/proc/$step/environ" 2>/dev/null | grep -q "^SLURM_CONF=$dir" || continue
     ls -l "/proc/$step/cwd" "/proc/$step/fd" 2>/dev/null | grep -q "spool.n1\|slurmd.n1" || continue
-    begun=$(descendants "$step")
-    [ -z "$begun" ] || victims="$victims $begun $step"
+    descendants "$step"
+    echo "$step"
   done
-  [ -z "$victims" ] || break
-  sleep 0.05
+}
+# Held while it is looked at: amid a task, and not between two, is the runner among them.
+victims=
+for _ in $(seq 200); do
+  victims=$(steps_of_n1)
+  kill -STOP "$daemon" $victims 2>/dev/null
+  runner=$(for pid in $victims; do
+    [ "$(readlink "/proc/$pid/exe")" = "$(readlink -f "$tool")" ] && echo "$pid"; done)
+  [ -n "$runner" ] && [ -n "$(squeue -h -r -t running -w n1)" ] && break
+  kill -CONT "$daemon" $victims 2>/dev/null
+  victims=
+  sleep 0.1
 done
-[ -n "$victims" ] || fail "node n1 runs no task"
+[ -n "$victims" ] || fail "n1 runs nothing midway: $(squeue -r)"
+done_runs=$(cat "$dir"/cluster/runs*.jsonl | wc -l)
 kill -9 "$daemon" $victims
-echo "node n1 killed after $done_runs runs: slurmd $daemon, and$victims"
+echo "node n1 killed after $done_runs runs: slurmd $daemon, and" $victims
 # Slurm is told, as a health check would: it would see it after SlurmdTimeout, which is long here lest a
 # busy machine is taken for a dead node.
 scontrol update nodename=n1 state=down reason=killed || fail "scontrol"
@@ -128,7 +138,8 @@ done
 squeue -h | grep -q . && fail "jobs are left after 500 s: $(squeue)"
 
 wait $local_campaign || fail "the local campaign: $(cat "$dir/local.log")"
-grep -q "Requeuing" "$dir/slurmctld.log" || fail "no task was begun anew"
+grep -q "Requeuing" "$dir/slurmctld.log" ||
+  fail "no task was begun anew: $(tail -20 "$dir/slurmctld.log")"
 cat "$dir/cluster/accept.log"
 grep -q "PASSED" "$dir/cluster/accept.log" || fail "the verdict on the cluster"
 for where in local cluster; do
