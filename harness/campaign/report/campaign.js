@@ -1,8 +1,10 @@
 "use strict";
+const problems = [];
+window.addEventListener("error", e => problems.push(e.message));
 const c = JSON.parse(document.getElementById("data").textContent);
 const page = document.getElementById("page");
 const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-const colours = {passed: "--good", failed: "--bad", crashed: "--c3", timeout: "--c4", killed: "--c1", error: "--soft", missing: "--line"};
+const colours = {passed: "--good", failed: "--bad", crashed: "--c3", timeout: "--c4", memory: "--c0", killed: "--c1", error: "--soft", missing: "--line"};
 
 function element(tag, parent, text, className) {
   const e = document.createElement(tag);
@@ -27,9 +29,9 @@ function ticks(lo, hi, most) {
   return all;
 }
 const charts = [];
-function chart(parent, height, draw) {
+function chart(parent, height, draw, measure) {
   const canvas = element("canvas", parent);
-  charts.push(() => {
+  charts.push({canvas, measure, draw() {
     const width = canvas.clientWidth, scale = window.devicePixelRatio || 1;
     canvas.width = Math.round(width * scale);
     canvas.height = Math.round(height * scale);
@@ -37,11 +39,10 @@ function chart(parent, height, draw) {
     const g = canvas.getContext("2d");
     g.scale(scale, scale);
     g.font = "11px system-ui, sans-serif";
-    draw(g, width, height);
-  });
-  return canvas;
+    return draw(g, width, height);
+  }});
 }
-const drawAll = () => charts.forEach(draw => draw());
+const drawAll = () => charts.forEach(c => c.draw());
 
 // Axes with labels; returns the two scales.
 function axes(g, width, height, x, y, xName, yName) {
@@ -146,9 +147,9 @@ function addHistogram(parent, m) {
     const span = m.high > m.low ? [m.low, m.high] : [m.low - 0.5, m.low + 0.5];
     const {X, Y} = axes(g, width, height, span, [0, most * 1.08], "", "runs");
     g.fillStyle = css("--c0");
-    const step = (span[1] - span[0]) / bins;
+    const step = (span[1] - span[0]) / bins, edges = m.counts.map((_, i) => [X(span[0] + i * step), X(span[0] + (i + 1) * step)]);
     m.counts.forEach((n, i) => {
-      const x0 = X(span[0] + i * step), x1 = X(span[0] + (i + 1) * step);
+      const [x0, x1] = edges[i];
       g.fillRect(x0 + 0.5, Y(n), Math.max(1, x1 - x0 - 1), Y(0) - Y(n));
     });
     for (const [percent, colour] of [[50, "--ink"], [95, "--bad"]]) {
@@ -162,7 +163,9 @@ function addHistogram(parent, m) {
       g.textBaseline = "top";
       g.fillText(percent + " %", x + (x > width - 50 ? -4 : 4), 8 + (percent === 95 ? 12 : 0));
     }
-  });
+    return {edges, perRun: Y(0) - Y(1)};
+  }, (pixels, {edges, perRun}) => ({histogram: m.name, pixel: 1 / perRun,
+    runs: edges.map(([x0, x1]) => pixels.tallest("--c0", x0, x1) / perRun)}));
   const line = element("div", figure, undefined, "quantiles");
   m.quantiles.forEach(([p, v]) => {
     const key = element("span", line, undefined, "key");
@@ -193,6 +196,12 @@ function addScatter(parent, metric, dispersion, rho) {
       }
     }
     g.globalAlpha = 1;
+    return {X, Y};
+  }, (pixels, {X, Y}) => {
+    const at = i => [X(d.values[i]), Y(m.values[i])], both = c.runs.map((_, i) => i).filter(i => m.values[i] !== null && d.values[i] !== null);
+    return {scatter: m.name + " over " + d.name, dots: both.length,
+      shown: both.filter(i => pixels.is("--c0", ...at(i)) || pixels.is("--bad", ...at(i))).length,
+      failed: both.filter(i => c.failed[i] && pixels.is("--bad", ...at(i))).length};
   });
 }
 function addImportance() {
@@ -245,3 +254,41 @@ addWorst();
 drawAll();
 window.addEventListener("resize", drawAll);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAll);
+
+// ---- with #selftest, for the tests of this page: what the canvases show, read back from their pixels
+class Pixels {
+  constructor(canvas) {
+    this.scale = canvas.width / canvas.clientWidth;
+    this.width = canvas.width;
+    this.height = canvas.height;
+    this.data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+  }
+  // A tenth of a line beneath may show through.
+  isAt(rgb, x, y) {
+    const at = 4 * (y * this.width + x);
+    return this.data[at + 3] > 100 && rgb.every((v, k) => Math.abs(v - this.data[at + k]) <= 25);
+  }
+  colour(name) {
+    const hex = css(name);
+    return [1, 3, 5].map(at => parseInt(hex.slice(at, at + 2), 16));
+  }
+  // Of that colour, in CSS pixels: a point; the tallest column between two.
+  is(name, x, y) { return this.isAt(this.colour(name), Math.floor(x * this.scale), Math.floor(y * this.scale)); }
+  tallest(name, x0, x1) {
+    const rgb = this.colour(name);
+    let most = 0;
+    for (let x = Math.ceil(x0 * this.scale); x < Math.floor(x1 * this.scale); ++x) {
+      let n = 0;
+      for (let y = 0; y < this.height; ++y) n += this.isAt(rgb, x, y);
+      most = Math.max(most, n);
+    }
+    return most / this.scale;
+  }
+}
+function measured() {
+  const texts = selector => [...document.querySelectorAll(selector)].map(e => e.textContent);
+  return {problems, charts: charts.map(c => { const scales = c.draw(); return c.measure(new Pixels(c.canvas), scales); }),
+    title: document.title, rate: texts(".rate b"), quantiles: texts(".quantiles"), groups: texts("td pre"), headings: texts("h2"),
+    replays: texts("td code")};
+}
+if (location.hash.includes("selftest")) element("pre", document.body, JSON.stringify(measured())).id = "selftest";

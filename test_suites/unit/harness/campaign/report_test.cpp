@@ -9,10 +9,13 @@
 #include <nlohmann/json.hpp>
 
 #include <cmath>
+#include <fstream>
 #include <limits>
 #include <sqlite3.h>
 #include <string>
 #include <vector>
+
+#include "../record/browser.hpp"
 
 namespace orrery {
 namespace {
@@ -114,6 +117,48 @@ TEST(CampaignReportTest, ThePageSaysWhatTheResultsDo) {
             "/opt/x_test --gtest_filter='Suite.Test' --orrery_seed=5 --orrery_run=9");
   EXPECT_EQ(json["slowest"][0][0], 39);
   EXPECT_EQ(json["worst"][0][0][2], 78);
+}
+
+// What a reader sees: bars as high as their bins, a dot for every run, the quantiles as text.
+TEST(CampaignReportTest, ABrowserShowsTheData) {
+  if (!has_chromium()) {
+    GTEST_SKIP() << "no chromium in PATH: apt-get install chromium, or ci/setup";
+  }
+  const TemporaryFolder folder("campaign_page");
+  std::ofstream(folder / "report.html") << campaign_page(kManifest, sample());
+  const nlohmann::json page = measured(folder / "report.html", folder / "profile");
+  ASSERT_TRUE(page.is_object());
+  EXPECT_EQ(page["problems"], nlohmann::json::array()) << "script errors";
+  EXPECT_EQ(page["title"], "Suite.Test: campaign");
+  EXPECT_EQ(page["rate"][0], "87.8 %");  // 36 of 41
+  // 2 mass without that of run 13, 21 kg: 0, 2 ... 78 but 42: the nearest ranks of 39.
+  EXPECT_EQ(page["quantiles"], nlohmann::json::array({"5 % 2"
+                                                      "25 % 18"
+                                                      "50 % 38"
+                                                      "75 % 60"
+                                                      "90 % 72"
+                                                      "95 % 76"
+                                                      "99 % 78"
+                                                      "largest 78"}));
+  EXPECT_THAT(page["groups"].dump(), HasSubstr("</script> "));
+  EXPECT_THAT(page["replays"].dump(), HasSubstr("--orrery_run=9"));
+  const auto& charts = page["charts"];
+  ASSERT_EQ(charts.size(), 3u) << "a metric, and over two dispersions";
+  ASSERT_EQ(charts[0]["histogram"], "delta_v_mps");
+  std::vector<double> values;
+  for (int mass = 0; mass < 40; ++mass) {
+    if (mass != 21) values.push_back(2 * mass);
+  }
+  const Histogram h = histogram_of(values);
+  ASSERT_EQ(charts[0]["runs"].size(), h.counts.size());
+  for (std::size_t i = 0; i < h.counts.size(); ++i) {  // to the pixel that an edge is blurred over
+    EXPECT_NEAR(charts[0]["runs"][i], h.counts[i], 1.5 * charts[0]["pixel"].get<double>()) << i;
+  }
+  for (const std::size_t i : {1u, 2u}) {  // 3 of 39 did not pass and have the metric
+    EXPECT_EQ(charts[i]["dots"], 39) << charts[i];
+    EXPECT_EQ(charts[i]["shown"], 39) << charts[i];
+    EXPECT_EQ(charts[i]["failed"], 3) << charts[i];
+  }
 }
 
 TEST(CampaignReportTest, TheTableHasALineForEachRun) {
