@@ -106,7 +106,7 @@ void FlightComputer::Impl::on_reset(const EventKind& kind, ResetCause cause, Dur
   if (&kind == &internal::kPowerCycle) {
     memory->files.lose_power();
     if (!options.clock_keeps_power) {
-      processor.clock().set_offset(-Duration(to_ns(loop_.now())));
+      processor.clock().set_offset(-Duration(to_ns(loop_.now())), loop_.now());
     }
     if (hooks_.on_power_cycle) hooks_.on_power_cycle();
   }

@@ -19,7 +19,7 @@ Processor::Processor(EventLoop& loop, OwnerId owner, OwnerId chooser) : Processo
 
 void Processor::jump_clock(SimTime t, Duration by) {
   loop_.schedule(t, {Phase::kFault, owner_, owner_, &kClockJump}, [this, by] {
-    clock_.set_offset(clock_.offset() + by);
+    clock_.jump(by);
     for (User* user : users_) user->clock_jumped();
   });
 }

@@ -299,7 +299,7 @@ TEST_F(FlightComputerTest, BootComesBeforeInputsOfItsInstant) {
 TEST_F(FlightComputerTest, FlightSoftwareSeesTheOnboardClock) {
   fly({});
   run_for(1us);
-  computer_->processor().clock().set_offset(-3us);
+  computer_->processor().clock().set_offset(-3us, loop_.now());
   at(10us, order("n"));
   at(20us, request_tick(to_ns(kStart + 40us)));  // onboard, so 43 of truth
   run_for(1ms);

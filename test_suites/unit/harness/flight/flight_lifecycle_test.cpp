@@ -176,7 +176,7 @@ TEST_P(FlightLifecycleTest, PowerCycleStartsDevicesColdAndTheClockAtZero) {
 TEST_P(FlightLifecycleTest, ClockWithABatteryAndAClockThroughARebootGoOn) {
   fly({.clock_keeps_power = true});
   run_for(1us);
-  computer_->processor().clock().set_offset(-3us);
+  computer_->processor().clock().set_offset(-3us, loop_.now());
   computer_->power_cycle(kStart + 10us, 5us);
   run_for(19us);
   EXPECT_EQ(boot_clock_ns_, to_ns(kStart + 12us));

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <functional>
@@ -414,6 +415,41 @@ TEST(ProcessorTest, TheScheduleRepeatsAndDependsOnNoOrderOfTies) {
   EXPECT_EQ(first.fingerprint, again.fingerprint);
   for (const std::uint64_t tie_seed : {1u, 2u, 3u, 4u, 5u}) {
     EXPECT_EQ(fly_jobs(tie_seed).notes, first.notes) << tie_seed;
+  }
+}
+
+// 1e-3 of 2 s are 2 ms, of 0.5 s 0.5 ms.
+TEST(OnboardClockTest, DriftsFromWhereItWasTold) {
+  OnboardClock clock;
+  clock.set_offset(-3us, kStart);
+  clock.set_drift(1e-3, kStart);
+  EXPECT_EQ(clock.offset(kStart), -3us);
+  EXPECT_EQ(clock.offset(kStart + 2s), 2ms - 3us);
+  EXPECT_EQ(clock.offset(kStart - 500ms), -500us - 3us);
+  clock.jump(1s);
+  EXPECT_EQ(clock.offset(kStart + 2s), 1s + 2ms - 3us);
+  clock.set_drift(-1e-3, kStart + 2s);
+  EXPECT_EQ(clock.offset(kStart + 2s), 1s + 2ms - 3us) << "a new drift is no jump";
+  EXPECT_EQ(clock.offset(kStart + 3s), 1s + 1ms - 3us);
+}
+
+// Property: the first instant at which it shows so much, and it never runs backwards: from 1 s to
+// 3 years from where drift counts, for drifts of either sign.
+TEST(OnboardClockTest, ReadsBackToTheFirstInstant) {
+  RandomStreams streams(1);
+  RandomStream& random = streams.stream("dsc", "clock", "test");
+  for (const double drift_sps : {0.01, 1e-5, 3e-9, -3e-9, -1e-5, -0.01}) {
+    OnboardClock clock;
+    clock.set_drift(drift_sps, kStart);
+    for (int i = 0; i < 2000; ++i) {
+      const double exponent = random.uniform(9, 17);
+      const std::int64_t shown = to_ns(kStart) + static_cast<std::int64_t>(std::pow(10, exponent));
+      const SimTime t = clock.truth(shown);
+      ASSERT_GE(clock.onboard_ns(t), shown) << drift_sps;
+      ASSERT_LT(clock.onboard_ns(t - 1ns), shown) << drift_sps;
+      ASSERT_LE(clock.onboard_ns(t), shown + 1) << drift_sps;
+      ASSERT_LE(clock.onboard_ns(t), clock.onboard_ns(t + 1ns)) << drift_sps;
+    }
   }
 }
 
