@@ -74,6 +74,7 @@ class Count final : public testing::MatcherInterface<const Channel&> {
   std::string nothing_known(const Channel& channel) const {
     const std::string name = '"' + channel.name() + '"';
     if (window_.waits_in_vain()) return name + " has no window" + window_.text();
+    if (const std::string why = forgotten(channel, window_); !why.empty()) return why;
     const bool sampled =
         channel.kind() == ChannelKind::kNumber || channel.kind() == ChannelKind::kVector;
     if (sampled && channel.empty()) return name + " has no sample, so nothing can be said of it";
@@ -97,8 +98,13 @@ class Count final : public testing::MatcherInterface<const Channel&> {
 class Before final : public testing::MatcherInterface<const Channel&> {
  public:
   explicit Before(const Channel& other)
-      : name_('"' + other.name() + '"'), first_(other.first_time()) {}
+      : name_('"' + other.name() + '"'),
+        first_(other.first_time()),
+        forgotten_(forgotten(other, always())) {}
   bool MatchAndExplain(const Channel& channel, MatchResultListener* out) const override {
+    for (const std::string& why : {forgotten(channel, always()), forgotten_}) {
+      if (!why.empty()) return fails_anyway(*out, why);
+    }
     const std::optional<SimTime> mine = channel.first_time();
     if (!mine) return fails_anyway(*out, '"' + channel.name() + "\" never happened");
     if (!first_) return fails_anyway(*out, name_ + " never happened");
@@ -117,6 +123,7 @@ class Before final : public testing::MatcherInterface<const Channel&> {
  private:
   std::string name_;
   std::optional<SimTime> first_;
+  std::string forgotten_;
 };
 
 // `axis` empty: each of the three.

@@ -61,6 +61,16 @@ bool fails_anyway(testing::MatchResultListener& out, const std::string& why) {
   return false;
 }
 
+std::string forgotten(const Channel& channel, const TimeWindow& window) {
+  if (channel.start() + window.from() >= channel.forgotten_until() ||
+      channel.forgotten_until() == channel.start()) {
+    return {};
+  }
+  return '"' + channel.name() + "\" is remembered from " +
+         when(channel, channel.forgotten_until()) +
+         " on only (WorldOptions::channel_memory), so nothing can be said of it" + window.text();
+}
+
 std::string placed(const Channel& channel, const Point& point) {
   std::string text = point.vector != nullptr ? "its norm is " : "it is ";
   text += quantity(channel, point.value) + " at " + when(channel, point.t) + on_spacecraft(channel);
@@ -73,6 +83,9 @@ bool OverWindow::MatchAndExplain(const Channel& channel, testing::MatchResultLis
       channel.kind() == ChannelKind::kNumber || channel.kind() == ChannelKind::kVector;
   if (!numeric && !asks_for_times_only()) {
     return fails_anyway(*out, name + " records " + to_string(channel.kind()) + ", not numbers");
+  }
+  if (const std::string why = forgotten(channel, window_); !why.empty()) {
+    return fails_anyway(*out, why);
   }
   const Points points = in_window(channel);
   if (points.empty()) {

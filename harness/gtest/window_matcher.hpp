@@ -25,6 +25,9 @@ Duration checked(const char* matcher, Duration span);
 /// per assertion: GoogleTest asks silently first, and again for the words.
 bool fails_anyway(testing::MatchResultListener& out, const std::string& why);
 
+/// Empty; or that the channel does not remember the window's begin.
+std::string forgotten(const Channel& channel, const TimeWindow& window);
+
 /// A sample, with its components if it has such.
 struct Point {
   SimTime t;

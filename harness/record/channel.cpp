@@ -59,7 +59,7 @@ Channel::Channel(std::string name, std::string unit, SimTime start)
 }
 
 Channel::Channel(std::string name, ChannelKind kind, SimTime start)
-    : name_(std::move(name)), kind_(kind), start_(start), end_(start) {
+    : name_(std::move(name)), kind_(kind), start_(start), end_(start), forgotten_until_(start) {
   if (kind_ == ChannelKind::kState || kind_ == ChannelKind::kEvent) return;
   unit_ = unit_of(name_);
   if (kind_ == ChannelKind::kVector) frame_ = frame_of(name_);
@@ -87,6 +87,19 @@ void Channel::add_sample(SimTime t, double value) {
   extend_to(t);
 }
 
+// When half of what there is may go: so each sample is moved once on average.
+void Channel::forget_before(SimTime t) {
+  const std::size_t half = samples_.size() / 2;
+  if (half == 0 || samples_[half].t > t) return;
+  const auto is_old = [t](const Sample& sample) { return sample.t < t; };
+  auto gone = std::find_if_not(samples_.begin(), samples_.end(), is_old) - samples_.begin();
+  if (kind_ == ChannelKind::kState && gone > 0) --gone;
+  if (gone == 0) return;
+  samples_.erase(samples_.begin(), samples_.begin() + gone);
+  if (kind_ == ChannelKind::kVector) vectors_.erase(vectors_.begin(), vectors_.begin() + gone);
+  forgotten_until_ = t;
+}
+
 // Few differ, so a search is short.
 double Channel::index_of(std::string_view text) {
   auto found = std::find(texts_.begin(), texts_.end(), text);
@@ -112,6 +125,7 @@ Channel Channel::along(std::size_t axis) const {
   component.frame_ = frame_;
   for (std::size_t i = 0; i < samples_.size(); ++i) component.add(samples_[i].t, vectors_[i][axis]);
   component.extend_to(end_);
+  component.forgotten_until_ = forgotten_until_;
   return component;
 }
 
@@ -127,6 +141,7 @@ Channel Channel::only(std::string_view wanted) const {
     if (text(sample) == wanted) kept.add(sample.t, wanted);
   }
   kept.extend_to(end_);
+  kept.forgotten_until_ = forgotten_until_;
   return kept;
 }
 

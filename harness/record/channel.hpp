@@ -55,6 +55,12 @@ class Channel {
   void add(SimTime t, std::string_view text);
   /// Says that all was recorded that there was up to t, be it nothing.
   void extend_to(SimTime t) { end_ = end_ < t ? t : end_; }
+  /// Gives up samples recorded before the first at or after t, perhaps later on, in bulk; of a
+  /// state the one in force at t stays. What is asked of an earlier time than forgotten_until()
+  /// cannot be answered any more: matchers on such a window fail.
+  void forget_before(SimTime t);
+  /// start(), if nothing was given up.
+  SimTime forgotten_until() const { return forgotten_until_; }
 
   const std::string& name() const { return name_; }
   ChannelKind kind() const { return kind_; }
@@ -98,7 +104,7 @@ class Channel {
 
   std::string name_, unit_, frame_;
   ChannelKind kind_ = ChannelKind::kNumber;
-  SimTime start_, end_;
+  SimTime start_, end_, forgotten_until_;
   std::vector<Sample> samples_;
   std::vector<Components> vectors_;  // of kVector, one per sample
   std::vector<std::string> texts_;   // of kState and kEvent, each once
