@@ -11,6 +11,9 @@
 #include "formation_keeping_messages.h"
 #include "orrery_flight.h"
 
+// As the package's static library calls its entry.
+extern "C" const orrery_flight* formation_keeping_entry(void);
+
 namespace formation_keeping {
 
 using namespace flight_support;
@@ -59,7 +62,7 @@ class Computer {
     tick_ns = ORRERY_NO_TICK;
     return flight()->tick(self_, now_ns);
   }
-  static const orrery_flight* flight() { return orrery_flight_entry(); }
+  static const orrery_flight* flight() { return formation_keeping_entry(); }
   static std::uint32_t id(const std::string& name, unsigned direction) {
     for (std::uint32_t k = 0; k < flight()->port_count; ++k) {
       const orrery_port& port = flight()->ports[k];
