@@ -215,6 +215,21 @@ void append_arena(std::string& out, const Report::Arena& arena) {
   out += '}';
 }
 
+void append_film(std::string& out, const Report::Film& film) {
+  out += '{';
+  append_member(out, "name", film.name);
+  append_key(out, "pictures");
+  append_array(out, film.pictures, [&out](const Report::Film::Picture& picture) {
+    out += '{';
+    append_key(out, "at");
+    append_seconds(out, picture.at);
+    append_member(out, "caption", picture.caption);
+    append_member(out, "png", picture.png_base64);
+    out += '}';
+  });
+  out += '}';
+}
+
 void append_event(std::string& out, const Report::Event& event) {
   out += '[';
   append_seconds(out, event.at);
@@ -282,6 +297,9 @@ std::string to_json(const Report& report) {
   append_list(out, "lanes", report.lanes, all, append_lane);
   append_list(out, "faults", report.faults, all, append_fault);
   append_list(out, "arenas", report.arenas, all, append_arena);
+  append_list(
+      out, "films", report.films, [](const Report::Film& film) { return !film.pictures.empty(); },
+      append_film);
   append_list(out, "events", report.events, all, append_event);
   return out + "}";
 }

@@ -70,6 +70,15 @@ struct Report {
     std::string name, caption;
     std::vector<std::string> rows;
   };
+  /// Pictures in order of time: PNG as base64.
+  struct Film {
+    struct Picture {
+      Duration at{};
+      std::string caption, png_base64;
+    };
+    std::string name;
+    std::vector<Picture> pictures;
+  };
   struct Event {
     Duration at{};
     std::string where, what;
@@ -93,6 +102,7 @@ struct Report {
   std::vector<Lane> lanes = {};
   std::vector<Fault> faults = {};
   std::vector<Arena> arenas = {};
+  std::vector<Film> films = {};
   std::vector<Event> events = {};
 };
 

@@ -647,6 +647,17 @@ if (report.arenas.length) {
   const box = element("div", page, undefined, "arenas");
   report.arenas.forEach(map => charts.push(new ArenaMap(box, map)));
 }
+report.films.forEach(film => {
+  element("h2", page, film.name);
+  const strip = element("div", page, undefined, "film");
+  film.pictures.forEach(picture => {
+    const box = element("figure", strip);
+    const image = element("img", box);
+    image.src = "data:image/png;base64," + picture.png;
+    image.alt = picture.caption;
+    element("figcaption", box, picture.caption + ", " + picture.at.toFixed(1) + " s");
+  });
+});
 if (report.faults.length) {
   element("h2", page, "Faults");
   addTable(page, ["from", "until", "where", "what"],
@@ -660,7 +671,7 @@ drawAll();
 
 // ---- with #selftest, for the tests of this page: what the canvases show, read back from their pixels
 function measured() {
-  const result = {charts: [], problems};
+  const result = {charts: [], problems, pictures: [...document.images].map(image => image.naturalWidth)};
   for (const chart of charts) {
     chart.draw();
     const pixels = chart.canvas.getContext("2d").getImageData(0, 0, chart.canvas.width, chart.canvas.height).data;
@@ -688,4 +699,5 @@ function measuredSeries(chart, series, index) {
   const onePixel = (chart.axis[1] - chart.axis[0]) / (canvas.height / scale - 28);
   return {name: series.name, pixel: onePixel, points};
 }
-if (testing) element("pre", document.body, JSON.stringify(measured())).id = "selftest";
+// Pictures are decoded by then.
+if (testing) addEventListener("load", () => { element("pre", document.body, JSON.stringify(measured())).id = "selftest"; });

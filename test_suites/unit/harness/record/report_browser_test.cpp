@@ -67,6 +67,12 @@ Report full_report() {
   report.lanes = {{"deputy process", {{0s, "on"}, {20h, "off"}}}};
   report.faults = {{"deputy/gnss", "outage", 10h, 12h}, {"chief-deputy", "loss", 30h, {}}};
   report.arenas = {{"Heap of deputy", "16 bytes per cell", {"##5.", "1."}}};
+  // One white pixel.
+  report.films = {
+      {"chief camera",
+       {{1h, "frame 1",
+         "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGP4DwABAQEAsTj2FAAAAABJRU5E"
+         "rkJggg=="}}}};
   report.events = {{5s, "deputy", "impulse of 1 m/s"}};
   return report;
 }
@@ -100,6 +106,7 @@ TEST(ReportBrowserTest, EveryPlotShowsItsData) {
                           "Along track and radial", "Cross track and radial",
                           "Along track and cross track", "Modes", "Slow [m]", "Jumping [bytes]",
                           "Converging [m]", "Burns [Ns]", "Link chief-deputy", "Heap of deputy"));
+  EXPECT_EQ(page["pictures"], nlohmann::json::array({1})) << "widths, 0 where not decoded";
   int points = 0;
   for (const auto& chart : page["charts"]) {
     for (const auto& series : chart["series"]) {

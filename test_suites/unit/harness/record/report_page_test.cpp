@@ -91,6 +91,7 @@ Report small_report() {
   report.lanes = {{"process of deputy", {{0s, "on"}, {4s, "off"}}}};
   report.faults = {{"deputy", "outage", 1s, 2s}, {"chief-deputy", "loss", 3s, {}}};
   report.arenas = {{"Heap of deputy", "16 bytes per cell", {"##5.", "1."}}};
+  report.films = {{"chief camera", {{1500ms, "frame 1", "aGk="}}}, {"deputy camera", {}}};
   report.events = {{5s, "deputy", "impulse\nof 1 m/s"}};
   return report;
 }
@@ -121,6 +122,9 @@ TEST(ReportPageTest, HoldsTheDataAsGiven) {
   EXPECT_EQ(data["faults"][0]["until"], 2);
   EXPECT_FALSE(data["faults"][1].contains("until"));
   EXPECT_EQ(data["arenas"][0]["rows"], json(R"(["##5.","1."])"));
+  EXPECT_EQ(data["films"], json(R"([{"name":"chief camera",
+                      "pictures":[{"at":1.5,"caption":"frame 1","png":"aGk="}]}])"))
+      << "a film without pictures is left out";
   EXPECT_EQ(data["events"], json(R"([[5,"deputy","impulse\nof 1 m/s"]])"));
 }
 
