@@ -2,10 +2,10 @@
 #pragma once
 
 #include <orrery/models/frames/vector.hpp>
+#include <orrery/models/orbit/radiation_force.hpp>
 
 namespace orrery {
 
-constexpr double kAstronomicalUnit_m = 149597870700.0;
 constexpr double kEarthAlbedo = 0.3;  // Bond albedo, as that of a Lambert sphere
 
 struct Lighting {
