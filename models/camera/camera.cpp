@@ -85,6 +85,7 @@ SceneOptions scene_options(const CameraOptions& o) {
                      .earth_view = o.earth_view,
                      .sun_and_moon = o.sun_and_moon,
                      .stray_light = o.stray_light};
+  scene.renderer = o.renderer;
   for (const CameraTarget& target : o.targets) scene.targets.push_back(target.mesh);
   return scene;
 }

@@ -38,6 +38,7 @@ struct CameraOptions {
   bool sun_and_moon = true;
   StrayLightOptions stray_light = {};
   std::vector<CameraTarget> targets = {};
+  Renderer renderer = Renderer::kCpu;
   int threads = 1;  // of rendering, 1 to 64; no bit depends on it
   Duration record_period =
       0s;  // of 16-bit PNG files and the film strip; 0 s: none, 1 ns: every frame
@@ -90,6 +91,7 @@ class Camera final : public Device {
 
   /// @param on_frame  Called in the middle of each exposure, lost ones included.
   /// @throws std::invalid_argument  an option outside its range, or a mounting that is no rotation.
+  ///         std::runtime_error     no OpenGL where it is asked for; says what to install.
   explicit Camera(const Options& options = {}, FrameCallback on_frame = {});
 
   std::string_view name() const override { return options_.name; }

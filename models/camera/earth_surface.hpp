@@ -25,6 +25,9 @@ class EarthSurface {
   /// In a direction of any length above 0: the normal of the ellipsoid there, ECEF. Linear between
   /// the cells of a face.
   Sample at(const Vec3& normal_ECEF) const;
+  /// All cells, face by face, and how many along an edge of one: for other renderers.
+  const std::vector<Sample>& samples() const { return faces_; }
+  int cells() const { return cells_; }
 
  private:
   int cells_ = 1;  // along an edge of a face

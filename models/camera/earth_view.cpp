@@ -1,5 +1,6 @@
 #include <orrery/harness/kernel/text.hpp>
 #include <orrery/models/camera/earth_view.hpp>
+#include <orrery/models/camera/gl_renderer.hpp>
 #include <orrery/models/camera/parallel_rows.hpp>
 
 #include <algorithm>
@@ -54,6 +55,20 @@ class EarthRays {
     x.a = dot(x.q, x.q), x.b = dot(x.q, p_);
     x.height = 0.5 * (c_ - x.b * x.b / x.a);
     return x;
+  }
+  GlRenderer::EarthDrawing drawing() const {
+    const EarthSurface& surface = options_.surface;
+    return {.R_EC = R_EC_,
+            .beta_C = beta_C_,
+            .to_sun_E = to_sun_,
+            .p = p_,
+            .stretch = stretch_,
+            .sun = sun_,
+            .scale_height = options_.scale_height_m / unit_m_,
+            .limb = options_.atmosphere ? options_.limb_reflectance : 0,
+            .glint = options_.glint,
+            .cells = surface.cells(),
+            .surface = &surface.samples()[0].albedo};
   }
   bool hits(const Crossing& x) const { return x.b < 0 && x.height <= 0; }
 
@@ -132,8 +147,16 @@ bool EarthView::hides(const Vec3& u_ECI, const EarthPose& pose) const {
 }
 
 void EarthView::add(Image<float>& suns, Image<float>& covered, const Image<PixelRay>& rays,
-                    const EarthPose& pose, float weight, int threads) const {
+                    const EarthPose& pose, float weight, int threads, GlRenderer* gl) const {
   const EarthRays earth(options_, pose);
+  if (gl != nullptr) {
+    const auto drawn = gl->earth(earth.drawing(), rays);
+    for (std::size_t k = 0; k < drawn.size(); ++k) {
+      suns.values[k] += weight * drawn[k].first;
+      covered.values[k] += weight * drawn[k].second;
+    }
+    return;
+  }
   for_bands_of_rows(threads, rays.height_px, [&](int first, int end) {
     for (std::size_t k = rays.index(0, first); k < rays.index(0, end); ++k) {
       const PixelRay& ray = rays.values[k];

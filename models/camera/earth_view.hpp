@@ -8,6 +8,8 @@
 
 namespace orrery {
 
+class GlRenderer;
+
 struct EarthViewOptions {
   EarthSurface surface = EarthSurface::uniform();
   double radius_m = 6378137;              // equatorial, WGS84
@@ -45,8 +47,10 @@ class EarthView {
   bool hides(const Vec3& u_ECI, const EarthPose& pose) const;
   /// @param suns     To which the irradiance at the camera by each pixel's part is added [suns].
   /// @param covered  Likewise the part of each pixel that the solid Earth covers.
+  /// @param gl       By which to draw; null: on the CPU.
   void add(Image<float>& suns, Image<float>& covered, const Image<PixelRay>& rays,
-           const EarthPose& pose, float weight = 1, int threads = 1) const;
+           const EarthPose& pose, float weight = 1, int threads = 1,
+           GlRenderer* gl = nullptr) const;
 
  private:
   EarthViewOptions options_;

@@ -1,3 +1,4 @@
+#include <orrery/models/camera/gl_renderer.hpp>
 #include <orrery/models/camera/mesh_view.hpp>
 #include <orrery/models/camera/parallel_rows.hpp>
 
@@ -98,16 +99,19 @@ void scan(DepthGrid& grid, const Corners& c, int id, int first_row, int end_row)
   }
 }
 
+struct SunAxes {
+  Vec3 z, x, y;
+  explicit SunAxes(const Vec3& to_sun)
+      : z(to_sun),
+        x(unit(std::abs(z.x) < 0.7 ? cross({1, 0, 0}, z) : cross({0, 1, 0}, z))),
+        y(cross(z, x)) {}
+};
+
 // What lies in sunlight: the nearest triangle to the Sun on a grid normal to its direction.
 class ShadowMap {
  public:
-  ShadowMap(const Mesh& mesh, const Vec3& to_sun_B, double size, int threads)
-      : radius_(mesh.radius_m()),
-        z_(to_sun_B),
-        x_(unit(std::abs(z_.x) < 0.7 ? cross({1, 0, 0}, z_) : cross({0, 1, 0}, z_))),
-        y_(cross(z_, x_)),
-        grid_(static_cast<int>(size), static_cast<int>(size)),
-        scale_(size / (2 * radius_)) {
+  ShadowMap(const Mesh& mesh, const Vec3& to_sun_B, int size, int threads)
+      : radius_(mesh.radius_m()), axes_(to_sun_B), grid_(size, size), scale_(size / (2 * radius_)) {
     std::vector<Corner> places;
     for (const Vec3& vertex : mesh.vertices_B()) places.push_back(place(vertex));
     for_bands_of_rows(threads, grid_.rows, [&](int first, int end) {
@@ -135,11 +139,12 @@ class ShadowMap {
 
  private:
   Corner place(const Vec3& p) const {
-    return {(dot(p, x_) + radius_) * scale_, (dot(p, y_) + radius_) * scale_, dot(p, z_)};
+    return {(dot(p, axes_.x) + radius_) * scale_, (dot(p, axes_.y) + radius_) * scale_,
+            dot(p, axes_.z)};
   }
 
   double radius_;
-  Vec3 z_, x_, y_;
+  SunAxes axes_;
   DepthGrid grid_;
   double scale_;
 };
@@ -157,8 +162,11 @@ class Shading {
   double lobe(const SurfaceMaterial& m, const Vec3& n, double cosine, const Vec3& to_camera) const {
     if (cosine <= 0 || m.specular == 0) return 0;
     const double half = std::max(0.0, dot(n, unit(to_sun_ + to_camera)));
-    return light_.sun * cosine * m.specular * (m.shininess + 8) / (8 * kPi) *
-           std::pow(half, m.shininess);
+    return lobe_factor(m, cosine) * std::pow(half, m.shininess);
+  }
+  double lobe_factor(const SurfaceMaterial& m, double cosine) const {
+    if (cosine <= 0) return 0;
+    return light_.sun * cosine * m.specular * (m.shininess + 8) / (8 * kPi);
   }
   double earthshine(const SurfaceMaterial& m, const Vec3& n) const {
     const double cosine = dot(n, to_earth_), w = light_.earth_width;
@@ -177,15 +185,18 @@ class MeshSampler {
               const Lighting& light)
       : mesh_(mesh), camera_(camera), pose_(pose), shading_(light, pose.R_TI) {}
 
-  MeshSamples sample(int threads) {
+  MeshSamples sample(int threads, GlRenderer* gl) {
     MeshSamples out;
     if (!project() || !lay_out(out)) return out;
     light_facets();
     measure_blocks(out);
+    if (gl != nullptr) {
+      take(out, gl->mesh(drawing(out)));
+      return out;
+    }
     DepthGrid grid(out.columns, out.rows);
     for_bands_of_rows(threads, out.rows, [&](int first, int end) { scan_all(grid, first, end); });
-    const ShadowMap shadows(mesh_, shading_.to_sun_B(),
-                            std::clamp(across_samples_, kAcrossAPoint, kLargestShadowMap), threads);
+    const ShadowMap shadows(mesh_, shading_.to_sun_B(), shadow_map_size(), threads);
     out.suns.assign(grid.triangle.size(), 0);
     out.covered.assign(grid.triangle.size(), 0);
     for_bands_of_rows(threads, out.rows,
@@ -292,6 +303,70 @@ class MeshSampler {
         solid_angles_.push_back(per_sample * camera_.solid_angle_sr(at));
       }
     }
+  }
+
+  GlRenderer::MeshDrawing drawing(const MeshSamples& s) const {
+    const SunAxes sun(shading_.to_sun_B());
+    GlRenderer::MeshDrawing out{.columns = s.columns,
+                                .rows = s.rows,
+                                .vertices = {},
+                                .to_sun = sun.z,
+                                .sun_x = sun.x,
+                                .sun_y = sun.y,
+                                .camera = camera_B_,
+                                .radius_m = mesh_.radius_m(),
+                                .shadow_size = shadow_map_size()};
+    double low = 1e300, high = 0;
+    for (const Corner& c : corners_) {
+      if (c.nearness == 0) continue;
+      low = std::min(low, c.nearness), high = std::max(high, c.nearness);
+    }
+    out.vertices.reserve(3 * facets_.size());
+    for (std::size_t k = 0; k < facets_.size(); ++k) {
+      const Mesh::Triangle& t = mesh_.triangles()[k];
+      const Facet& f = facets_[k];
+      const SurfaceMaterial& m = material(t);
+      const Corners corners = corners_of(t);
+      const bool is_seen = corners[0].nearness != 0 && corners[1].nearness != 0 &&
+                           corners[2].nearness != 0 && doubled_area(corners) < 0;
+      for (std::size_t i = 0; i < 3; ++i) {
+        const Corner& c = corners[i];
+        const Vec3& p = vertex(t, i);
+        const Vec3& n = f.normal_B;
+        const double farness = high > low ? (high - c.nearness) / (high - low) : 0.5;
+        out.vertices.push_back({.u = float(c.u),
+                                .v = float(c.v),
+                                .depth = is_seen ? float(2 * farness - 1) : 2.0f,
+                                .distance = is_seen ? float(1 / c.nearness) : 1.0f,
+                                .position = {float(p.x), float(p.y), float(p.z)},
+                                .normal = {float(n.x), float(n.y), float(n.z)},
+                                .cosine = float(f.cosine),
+                                .lambert = float(f.lambert),
+                                .earthshine = float(f.earthshine),
+                                .lobe = float(shading_.lobe_factor(m, f.cosine)),
+                                .shininess = float(m.shininess),
+                                .id = float(k)});
+      }
+    }
+    return out;
+  }
+  void take(MeshSamples& out, const std::vector<float>& radiance) const {
+    out.suns.assign(radiance.size(), 0);
+    out.covered.assign(radiance.size(), 0);
+    std::size_t at = 0;
+    for (int row = 0; row < out.rows; ++row) {
+      for (int column = 0; column < out.columns; ++column, ++at) {
+        if (radiance[at] < 0) continue;
+        out.covered[at] = 1;
+        out.suns[at] = static_cast<float>(solid_angle_sr(column, row) * double(radiance[at]));
+      }
+    }
+  }
+  double solid_angle_sr(int column, int row) const {
+    return solid_angles_[static_cast<std::size_t>(row / kBlock * block_columns_ + column / kBlock)];
+  }
+  int shadow_map_size() const {
+    return static_cast<int>(std::clamp(across_samples_, kAcrossAPoint, kLargestShadowMap));
   }
 
   // What all points of a triangle share.
@@ -457,8 +532,8 @@ double MeshSamples::area_px2() const {
 }
 
 MeshSamples sample_mesh(const Mesh& mesh, const PinholeCamera& camera, const MeshPose& pose,
-                        const Lighting& light, int threads) {
-  return MeshSampler(mesh, camera, pose, light).sample(threads);
+                        const Lighting& light, int threads, GlRenderer* gl) {
+  return MeshSampler(mesh, camera, pose, light).sample(threads, gl);
 }
 
 void add_samples(ElectronImage& image, Image<float>& covered, const MeshSamples& s,

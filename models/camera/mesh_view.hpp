@@ -10,6 +10,8 @@
 
 namespace orrery {
 
+class GlRenderer;
+
 struct MeshPose {
   Mat3 R_CI{}, R_TI{};  // axes of the camera and of the target
   Vec3 r_TC_ECI{};      // target's origin relative to the camera [m]
@@ -40,9 +42,10 @@ struct MeshSamples {
 ///             angle.
 /// Errors      An edge is in place to half a sample at worst, along rows or columns. Edges of large
 ///             triangles are straight in the image: the lens's bend along them is left out.
+/// @param gl   By which to draw, in 32-bit floats; null: on the CPU.
 /// Checked by  test_suites/unit/models/camera/mesh_view_test.cpp: closed forms of sphere and box.
 MeshSamples sample_mesh(const Mesh& mesh, const PinholeCamera& camera, const MeshPose& pose,
-                        const Lighting& light, int threads = 1);
+                        const Lighting& light, int threads = 1, GlRenderer* gl = nullptr);
 
 /// Spreads the samples over the pixels by the PSF, each integrated over the pixels.
 /// @param covered  To which the covered part of each pixel, blurred likewise, is added.

@@ -1,5 +1,6 @@
 #include <orrery/models/camera/blur.hpp>
 #include <orrery/models/camera/celestial_disc.hpp>
+#include <orrery/models/camera/gl_renderer.hpp>
 #include <orrery/models/camera/parallel_rows.hpp>
 #include <orrery/models/camera/scene.hpp>
 #include <orrery/models/orbit/earth.hpp>
@@ -30,6 +31,13 @@ double instant_s(int k, int n, double duration_s) {
 
 double focal_px(const PinholeCamera& camera) {
   return std::max(camera.fx_px(), camera.fy_px());
+}
+
+std::unique_ptr<GlRenderer> gl_renderer(Renderer renderer) {
+  if (renderer == Renderer::kCpu) return {};
+  return std::make_unique<GlRenderer>(renderer == Renderer::kOsMesa ? GlPlatform::kOsMesa
+                                      : renderer == Renderer::kEgl  ? GlPlatform::kEgl
+                                                                    : GlPlatform::kAny);
 }
 
 // Calls work(k) for all values of an image.
@@ -63,6 +71,7 @@ Scene::Scene(const PinholeCamera& camera, const OpticsOptions& optics, SceneOpti
       throw std::invalid_argument("Scene: a target without triangles");
     }
   }
+  gl_ = gl_renderer(options_.renderer);
 }
 
 Scene::~Scene() = default;
@@ -98,10 +107,23 @@ SceneFrame Scene::render(const SceneState& state, const ExposureTime& exposure, 
     const int v = std::clamp(static_cast<int>(std::lround(at->v)), 0, covered.height_px - 1);
     return covered.at(u, v) > 0.5f;
   };
-  frame.stars = stars_.draw(frame.light, camera_, optics_, state.camera, exposure, is_hidden);
+  frame.stars = draw_stars(frame.light, state, exposure, is_hidden);
   draw_stray_light(frame.light, state, exposure.duration_s);
   vignetting_.apply(frame.light, threads);
   return frame;
+}
+
+std::vector<DrawnPoint> Scene::draw_stars(ElectronImage& image, const SceneState& state,
+                                          const ExposureTime& exposure,
+                                          const StarField::IsHidden& is_hidden) const {
+  if (!gl_) return stars_.draw(image, camera_, optics_, state.camera, exposure, is_hidden);
+  std::vector<GlRenderer::Point> points;
+  const auto sink = [&points](const Pixel& at, double electrons) {
+    points.push_back({float(at.u), float(at.v), float(electrons)});
+  };
+  auto drawn = stars_.trace(sink, camera_, optics_, state.camera, exposure, is_hidden);
+  gl_->add_points(image, points, optics_.options().psf_sigma_px);
+  return drawn;
 }
 
 EarthPose Scene::earth_pose(const SceneState& state, double dt_s) const {
@@ -134,7 +156,7 @@ void Scene::draw_background(SceneFrame& frame, const SceneState& state,
     for (int k = 0; k < count; ++k) {
       const double dt = count == 1 ? 0 : instant_s(k, count, exposure.duration_s);
       earth_.add(suns, covered, rays_, earth_pose(state, dt), 1.0f / static_cast<float>(count),
-                 threads);
+                 threads, gl_.get());
     }
     cover(sky, covered, suns, threads);
   }
@@ -210,7 +232,8 @@ std::optional<SeenTarget> Scene::draw_target(SceneFrame& frame, Image<float>& co
   if (!origin || is_behind_the_earth(r_TC, state)) return {};
   const double middle_row = 0.5 * (camera_.height_px() - 1);
   view.row_s = (std::clamp(origin->v, 0.0, 2 * middle_row) - middle_row) * exposure.row_period_s;
-  const MeshSamples samples = sample_mesh(view.mesh, camera_, view.at(0), view.light, threads);
+  const MeshSamples samples =
+      sample_mesh(view.mesh, camera_, view.at(0), view.light, threads, gl_.get());
   SeenTarget seen{
       .origin = *origin,
       .photocentre = samples.suns.empty() ? *origin : samples.photocentre(),
@@ -251,9 +274,10 @@ void Scene::draw_mesh(ElectronImage& image, Image<float>& covered, const TargetV
   const double electrons_per_sun = optics_.electrons_ps_of_suns(exposure.duration_s);
   for (int k = 0; k < count; ++k) {
     const MeshPose pose = view.at(instant_s(k, count, exposure.duration_s));
-    add_samples(layer, layer_covered,
-                count == 1 ? middle : sample_mesh(view.mesh, camera_, pose, view.light, threads),
-                electrons_per_sun, optics_.options().psf_sigma_px, 1.0 / count, threads);
+    add_samples(
+        layer, layer_covered,
+        count == 1 ? middle : sample_mesh(view.mesh, camera_, pose, view.light, threads, gl_.get()),
+        electrons_per_sun, optics_.options().psf_sigma_px, 1.0 / count, threads);
   }
   cover(image, layer_covered, layer, threads);
   if (covered.values.empty()) covered = Image<float>(image.width_px, image.height_px);

@@ -15,6 +15,11 @@
 
 namespace orrery {
 
+class GlRenderer;
+
+/// kOpenGl: OSMesa where it is installed, else EGL without a surface. See the README.
+enum class Renderer { kCpu, kOpenGl, kOsMesa, kEgl };
+
 struct SceneOptions {
   StarCatalogue stars = {};
   bool earth = true;
@@ -23,6 +28,7 @@ struct SceneOptions {
   StrayLightOptions stray_light = {};
   /// Other spacecraft, in the order of SceneState::targets.
   std::vector<Mesh> targets = {};
+  Renderer renderer = Renderer::kCpu;
 };
 
 /// At the middle of the exposure; turns and moves evenly during it.
@@ -62,10 +68,14 @@ struct SceneFrame {
 ///             discs at that of the middle row.
 /// Not there   Shadows and light of one target on another, and of the Moon; stars through the
 ///             atmosphere above the solid Earth's edge are not dimmed.
-/// Checked by  test_suites/unit/models/camera/scene_test.cpp
+/// OpenGL      Draws stars, Earth and meshes in 32-bit floats by the same steps; points, Moon, Sun,
+///             PSF and stray light stay on the CPU. Pixels are then the driver's: equal on OSMesa
+///             and EGL of one Mesa, for any number of its threads, not on every processor.
+/// Checked by  test_suites/unit/models/camera/scene_test.cpp, gl_renderer_test.cpp
 class Scene {
  public:
   /// @throws std::invalid_argument  an option outside its range; a target without triangles.
+  ///         std::runtime_error     no OpenGL where it is asked for; says what to install.
   Scene(const PinholeCamera& camera, const OpticsOptions& optics, SceneOptions options);
   ~Scene();
   Scene(const Scene&) = delete;
@@ -78,6 +88,9 @@ class Scene {
   SceneFrame render(const SceneState& state, const ExposureTime& exposure, int threads = 1);
 
  private:
+  std::vector<DrawnPoint> draw_stars(ElectronImage& image, const SceneState& state,
+                                     const ExposureTime& exposure,
+                                     const StarField::IsHidden& is_hidden) const;
   void draw_background(SceneFrame& frame, const SceneState& state, const ExposureTime& exposure,
                        int threads);
   void draw_discs(Image<float>& suns, const SceneState& state, const Mat3& R_CI,
@@ -100,7 +113,8 @@ class Scene {
   EarthView earth_;
   StarField stars_;
   Vignetting vignetting_;
-  Image<PixelRay> rays_;  // empty until the Earth is in view
+  Image<PixelRay> rays_;            // empty until the Earth is in view
+  std::unique_ptr<GlRenderer> gl_;  // null: on the CPU
 };
 
 }  // namespace orrery

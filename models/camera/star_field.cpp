@@ -50,9 +50,25 @@ int instants(const std::optional<Pixel>& a, const std::optional<Pixel>& b) {
 
 }  // namespace
 
+namespace {
+
+PointSink sink_into(ElectronImage& image, const Optics& optics) {
+  return [&image, sigma_px = optics.options().psf_sigma_px](const Pixel& at, double electrons) {
+    add_point(image, at, electrons, sigma_px);
+  };
+}
+
+}  // namespace
+
 std::optional<Pixel> add_source(ElectronImage& image, const PinholeCamera& camera,
                                 const Optics& optics, const CameraPose& pose,
                                 const ExposureTime& exposure, const PointSource& source) {
+  return trace_source(sink_into(image, optics), camera, pose, exposure, source);
+}
+
+std::optional<Pixel> trace_source(const PointSink& sink, const PinholeCamera& camera,
+                                  const CameraPose& pose, const ExposureTime& exposure,
+                                  const PointSource& source) {
   const Track track(camera, pose, exposure, source);
   const std::optional<Pixel> middle = track.at(0);
   const double half = 0.5 * exposure.duration_s;
@@ -61,7 +77,7 @@ std::optional<Pixel> add_source(ElectronImage& image, const PinholeCamera& camer
   for (int k = 0; k < count; ++k) {
     const double dt = count == 1 ? 0 : half * ((2 * k + 1.0) / count - 1);
     const std::optional<Pixel> at = track.at(dt);
-    if (at) add_point(image, *at, electrons, optics.options().psf_sigma_px);
+    if (at) sink(*at, electrons);
   }
   return middle;
 }
@@ -70,6 +86,13 @@ std::vector<DrawnPoint> StarField::draw(ElectronImage& image, const PinholeCamer
                                         const Optics& optics, const CameraPose& pose,
                                         const ExposureTime& exposure,
                                         const IsHidden& is_hidden) const {
+  return trace(sink_into(image, optics), camera, optics, pose, exposure, is_hidden);
+}
+
+std::vector<DrawnPoint> StarField::trace(const PointSink& sink, const PinholeCamera& camera,
+                                         const Optics& optics, const CameraPose& pose,
+                                         const ExposureTime& exposure,
+                                         const IsHidden& is_hidden) const {
   const double longest_s = exposure.duration_s + exposure.row_period_s * camera.height_px();
   const double reach = camera.half_field_rad() + kSlack_rad + norm(pose.omega_CI_C) * longest_s +
                        6 * optics.options().psf_sigma_px / std::min(camera.fx_px(), camera.fy_px());
@@ -83,7 +106,7 @@ std::vector<DrawnPoint> StarField::draw(ElectronImage& image, const PinholeCamer
     const Vec3 seen_ECI = aberrated(direction_ECI(star, years), velocity_ECI);
     if (is_hidden && is_hidden(seen_ECI)) continue;
     const PointSource source{seen_ECI, {}, optics.electrons_ps(star.magnitude)};
-    const std::optional<Pixel> at = add_source(image, camera, optics, pose, exposure, source);
+    const std::optional<Pixel> at = trace_source(sink, camera, pose, exposure, source);
     if (at && camera.is_inside(*at)) {
       drawn.push_back({star.number, *at, source.electrons_ps * exposure.duration_s});
     }

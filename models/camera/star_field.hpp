@@ -24,6 +24,9 @@ struct DrawnPoint {
   double electrons = 0;
 };
 
+/// Takes the light of one instant of a point.
+using PointSink = std::function<void(const Pixel& at, double electrons)>;
+
 /// Adds a point's light over an exposure.
 ///
 /// Method      Its image is cut into instants so close that it moves by at most half a pixel from
@@ -35,6 +38,10 @@ struct DrawnPoint {
 std::optional<Pixel> add_source(ElectronImage& image, const PinholeCamera& camera,
                                 const Optics& optics, const CameraPose& pose,
                                 const ExposureTime& exposure, const PointSource& source);
+/// The same into a sink, which may draw it otherwise.
+std::optional<Pixel> trace_source(const PointSink& sink, const PinholeCamera& camera,
+                                  const CameraPose& pose, const ExposureTime& exposure,
+                                  const PointSource& source);
 
 /// Draws the stars in the field: proper motion to the instant, aberration by the Earth's and the
 /// spacecraft's velocity. Parallax (below 0.8") and light deflection (below 0.02" beyond 45 deg
@@ -52,6 +59,9 @@ class StarField {
   std::vector<DrawnPoint> draw(ElectronImage& image, const PinholeCamera& camera,
                                const Optics& optics, const CameraPose& pose,
                                const ExposureTime& exposure, const IsHidden& is_hidden = {}) const;
+  std::vector<DrawnPoint> trace(const PointSink& sink, const PinholeCamera& camera,
+                                const Optics& optics, const CameraPose& pose,
+                                const ExposureTime& exposure, const IsHidden& is_hidden = {}) const;
 
  private:
   StarCatalogue catalogue_;
