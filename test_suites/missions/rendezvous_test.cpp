@@ -234,6 +234,9 @@ void fly_inspection(RunId run) {
   EXPECT_LT(nearest_m, 17);
   EXPECT_GT(farthest_m, 60);
   EXPECT_GT(world.keypoints().flipped(), 50);
+  // Of the cap of 1 MB, which a list of all solutions once exceeded in one flight of 20.
+  EXPECT_LT(world.heap("chaser").high_water_bytes(), 300'000u);
+  world.record_metric("heap_bytes", static_cast<double>(world.heap("chaser").high_water_bytes()));
   world.expect_sound();
 }
 

@@ -25,17 +25,17 @@ int real_roots(const double a[5], double roots[4]) {
       for (int j = 0; j < 4; ++j) {
         if (j != k) others *= z[k] - z[j];
       }
-      if (std::abs(others) < 1e-300) return 0;
+      if (!(std::norm(others) > 0.0)) return 0;
       const Complex step = polynomial(z[k]) / others;
       z[k] -= step;
-      moved = std::max(moved, std::abs(step));
+      moved = std::max(moved, std::norm(step));
     }
-    if (moved < 1e-14) break;
+    if (moved < 1e-28) break;
   }
   int count = 0;
   for (const Complex& root : z) {
     // A double root, as of weak perspective, comes as a pair that is 1e-3 off the axis.
-    if (std::fabs(root.imag()) < 0.02 * std::abs(root)) roots[count++] = root.real();
+    if (root.imag() * root.imag() < 0.0004 * std::norm(root)) roots[count++] = root.real();
   }
   return count;
 }
@@ -80,7 +80,8 @@ class PoseFit {
     Pixel pixel;
     const Vec3& point = points_B_[static_cast<std::size_t>(keypoint.point)];
     if (!project(camera_, pose.r_BC_C + pose.R_CB * point, &pixel)) return INFINITY;
-    return std::hypot(pixel.u - keypoint.pixel.u, pixel.v - keypoint.pixel.v);
+    const double du = pixel.u - keypoint.pixel.u, dv = pixel.v - keypoint.pixel.v;
+    return std::sqrt(du * du + dv * dv);
   }
 
   int count(const Pose& pose, double reach_px) const {
@@ -178,6 +179,15 @@ std::vector<Triple> triples(int count, int most) {
   return list;
 }
 
+// The best by inliers, of equals the first: a thousand solutions of triples need no room.
+constexpr std::size_t kMostCandidates = 12;
+
+void keep(const Pose& pose, std::vector<Pose>* best) {
+  const auto better = [](const Pose& a, const Pose& b) { return a.inliers > b.inliers; };
+  best->insert(std::upper_bound(best->begin(), best->end(), pose, better), pose);
+  if (best->size() > kMostCandidates) best->pop_back();
+}
+
 double turn_between_rad(const Mat3& a, const Mat3& b) {
   const Mat3 D = a * transpose(b);
   return std::acos(std::clamp(0.5 * (D(0, 0) + D(1, 1) + D(2, 2) - 1.0), -1.0, 1.0));
@@ -232,6 +242,7 @@ bool estimate_pose(const Camera& camera, const std::vector<Vec3>& points_B,
     if (!known || !unproject(camera, seen[k].pixel, &directions[k])) return false;
   }
   std::vector<Pose> candidates;
+  candidates.reserve(kMostCandidates + 1);
   for (const Triple& triple : triples(static_cast<int>(seen.size()), options.most_triples)) {
     Vec3 from_B[3], towards_C[3];
     for (int k = 0; k < 3; ++k) {
@@ -243,12 +254,9 @@ bool estimate_pose(const Camera& camera, const std::vector<Vec3>& points_B,
     const int count = solve_three_points(from_B, towards_C, solutions);
     for (int k = 0; k < count; ++k) {
       solutions[k].inliers = fit.count(solutions[k], options.consensus_px);
-      if (solutions[k].inliers >= 4) candidates.push_back(solutions[k]);
+      if (solutions[k].inliers >= 4) keep(solutions[k], &candidates);
     }
   }
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Pose& a, const Pose& b) { return a.inliers > b.inliers; });
-  if (candidates.size() > 12) candidates.resize(12);
   bool found = false;
   for (Pose& candidate : candidates) {
     if (!fit.refine(options.consensus_px, options.gate_sigma, &candidate)) {
