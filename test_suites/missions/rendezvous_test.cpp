@@ -153,6 +153,29 @@ TEST(RendezvousCampaign, ArrivesFromThirtyKilometresThroughOutages) {
   EXPECT_LT(delta_v.mean(), 2.0);
 }
 
+// An hour and a half without the target's GNSS and without a camera, in the middle of a leg: no
+// estimate after an hour, so it holds, and goes on when there is one again. Then an abort on
+// command. Both end in orbits that are safe without doing anything.
+TEST(RendezvousTest, OutageHoldsAndAbortLeadsOut) {
+  RendezvousOptions options;
+  options.roe_m = {.da = 0, .dl = -900, .dex = 0, .dey = 120, .dix = 0, .diy = 120};
+  options.directions = options.keypoints = false;
+  RendezvousWorld world(options);
+  world.command(20min, RPO_KIT_GO);
+  world.gnss("target").outage(at(6h), 90min);
+  world.command(10h, RPO_KIT_ABORT);
+  ASSERT_TRUE(world.run_until([&] { return world.mode == RPO_KIT_MODE_HOLDING; }, 8h));
+  EXPECT_GT(world.elapsed(), 6h + 55min);
+  ASSERT_TRUE(world.run_until([&] { return world.mode == RPO_KIT_MODE_APPROACHING; }, 2h));
+  ASSERT_TRUE(world.run_until([&] { return world.mode == RPO_KIT_MODE_SAFE; }, 8h));
+  world.run_for(3 * kRevolution);
+  const RelativeElements end_m = world.mean_roe_m();
+  EXPECT_GT(std::hypot(end_m.dex, end_m.dey), 150);
+  EXPECT_GT(std::hypot(end_m.dix, end_m.diy), 150);
+  EXPECT_GT(world.nearest_m, kKeepOut_m);
+  world.expect_sound();
+}
+
 // ---- figure 22, right: an uncooperative target that tumbles
 
 namespace {
