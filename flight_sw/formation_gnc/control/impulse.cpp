@@ -61,23 +61,22 @@ ThrusterScale::ThrusterScale(const ThrusterErrors& errors) : errors_(errors) {
 // A component is scale c (1 + shot), what the others' misalignment adds, and noise. Its own enters
 // in second order only.
 bool ThrusterScale::observe(const Vec3& commanded_B, const Vec3& observed_B,
-                            double observed_sigma_mps) {
-  if (!is_finite(commanded_B) || !is_finite(observed_B) || !(observed_sigma_mps > 0.0)) {
-    return false;
-  }
+                            const Vec3& observed_sigma_B) {
+  if (!is_finite(commanded_B) || !is_finite(observed_B)) return false;
   bool learnt = false;
   const double floor = kLasting * errors_.misalignment_rad, floor2 = floor * floor;
   for (int axis = 0; axis < 3; ++axis) {
     const double c = commanded_B[axis];
-    if (!(std::fabs(c) > kLeast_quanta * errors_.quantum_mps)) continue;
+    const double sigma_mps = observed_sigma_B[axis];
+    if (!(std::fabs(c) > kLeast_quanta * errors_.quantum_mps) || !(sigma_mps > 0.0)) continue;
     const int nozzle = nozzle_of(axis, c);
     const double across2 = dot(commanded_B, commanded_B) - c * c;
     const double shot = errors_.shot_to_shot * scale_[nozzle];
-    const double noise2 = (observed_sigma_mps * observed_sigma_mps +
-                           errors_.quantum_mps * errors_.quantum_mps / 12.0 +
-                           errors_.misalignment_rad * errors_.misalignment_rad * across2) /
-                              (c * c) +
-                          shot * shot;
+    const double noise2 =
+        (sigma_mps * sigma_mps + errors_.quantum_mps * errors_.quantum_mps / 12.0 +
+         errors_.misalignment_rad * errors_.misalignment_rad * across2) /
+            (c * c) +
+        shot * shot;
     const double S = variance_[nozzle] + noise2;
     const double innovation = observed_B[axis] / c - scale_[nozzle];
     if (!(innovation * innovation <= kGate_sigma * kGate_sigma * S)) continue;

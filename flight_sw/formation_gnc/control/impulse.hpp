@@ -58,13 +58,13 @@ class ThrusterScale {
 
   explicit ThrusterScale(const ThrusterErrors& errors = {});
 
-  /// @param commanded_B     What the thruster was asked for [m/s], body axes.
-  /// @param observed_B      What navigation saw of it.
-  /// @param observed_sigma  1-sigma per axis of that [m/s], above 0.
+  /// @param commanded_B       What the thruster was asked for [m/s], body axes.
+  /// @param observed_B        What navigation saw of it.
+  /// @param observed_sigma_B  1-sigma per axis of that [m/s], above 0.
   /// @return false if no component is anything to learn from: not finite, no burn, or more than
   ///         5 sigma off.
   bool observe(const flight_support::Vec3& commanded_B, const flight_support::Vec3& observed_B,
-               double observed_sigma_mps);
+               const flight_support::Vec3& observed_sigma_B);
 
   double scale(int nozzle) const { return scale_[nozzle]; }  ///< delivered over commanded
   double sigma(int nozzle) const;

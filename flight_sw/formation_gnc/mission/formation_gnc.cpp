@@ -65,6 +65,10 @@ Vec3 vec3_of(const double* v) {
   return vec3(v[0], v[1], v[2]);
 }
 
+Vec3 velocity_variances(const Matrix6& P) {
+  return vec3(P(3, 3), P(4, 4), P(5, 5));
+}
+
 double trace_of_position(const Matrix6& P) {
   return P(0, 0) + P(1, 1) + P(2, 2);
 }
@@ -432,7 +436,7 @@ void FormationGnc::command_burn(const Impulse& wanted) {
   const Mat3 P = maneuver_covariance(expected_B, scale_.errors(expected_B));
   const double sigma_mps = std::sqrt((P(0, 0) + P(1, 1) + P(2, 2)) / 3.0);
   navigation_.maneuver(Who::kSelf, expected.t_ns, expected.dv_ECI, sigma_mps);
-  watch_burn(expected, R_BI, commanded_B);
+  watch_burn(expected, R_BI, commanded_B, sigma_mps);
   Payload notice;
   ByteWriter writer(notice.data, sizeof notice.data);
   writer.u8(kManeuverNotice);
@@ -451,7 +455,8 @@ void FormationGnc::command_burn(const Impulse& wanted) {
 
 // ---- the thruster's scale: velocity predicted with the burn, against what navigation finds later
 
-void FormationGnc::watch_burn(const Impulse& expected, const Mat3& R_BI, const Vec3& commanded_B) {
+void FormationGnc::watch_burn(const Impulse& expected, const Mat3& R_BI, const Vec3& commanded_B,
+                              double sigma_mps) {
   if (watched_.waiting) return;
   watched_.look_ns = expected.t_ns + nanoseconds(kScaleLook_s);
   const FormationEstimate predicted = navigation_.at(watched_.look_ns);
@@ -460,6 +465,8 @@ void FormationGnc::watch_burn(const Impulse& expected, const Mat3& R_BI, const V
   watched_.commanded_B = commanded_B;
   watched_.R_BI = R_BI;
   watched_.predicted_v = predicted.v_relative_ECI;
+  watched_.predicted_variance = velocity_variances(predicted.relative_covariance_RTN);
+  watched_.sigma_mps = sigma_mps;
 }
 
 void FormationGnc::learn_scale(std::int64_t now_ns) {
@@ -468,10 +475,26 @@ void FormationGnc::learn_scale(std::int64_t now_ns) {
   watched_.waiting = false;
   const FormationEstimate found = navigation_.at(watched_.look_ns);
   if (!found.valid || !found.fixed) return;
-  const Matrix6& P = found.relative_covariance_RTN;
-  const double sigma_mps = std::sqrt((P(3, 3) + P(4, 4) + P(5, 5)) / 3.0);
-  const Vec3 observed = watched_.expected - (found.v_relative_ECI - watched_.predicted_v);
-  scale_.observe(watched_.commanded_B, watched_.R_BI * observed, 1.5 * sigma_mps);
+  // What was found rests on the prediction too, burn included; what measurements alone say is
+  // further off by before / (before - after), and as uncertain as their information makes it.
+  const Mat3 R_HI = eci_to_rtn({found.r_self_ECI, found.v_self_ECI});
+  const Vec3 after = velocity_variances(found.relative_covariance_RTN);
+  Vec3 change_RTN = R_HI * (found.v_relative_ECI - watched_.predicted_v), variance;
+  for (int k = 0; k < 3; ++k) {
+    const double before = watched_.predicted_variance[k];
+    if (!(after[k] < 0.9 * before)) return;
+    const double gain = before / (before - after[k]);
+    change_RTN[k] *= gain;
+    variance[k] = std::max(0.0, before - watched_.sigma_mps * watched_.sigma_mps) + gain * after[k];
+  }
+  const Mat3 R_BH = watched_.R_BI * transpose(R_HI);
+  Vec3 sigma_B;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int k = 0; k < 3; ++k) sigma_B[axis] += R_BH(axis, k) * R_BH(axis, k) * variance[k];
+    sigma_B[axis] = std::sqrt(sigma_B[axis]);
+  }
+  const Vec3 observed_B = watched_.R_BI * watched_.expected - R_BH * change_RTN;
+  scale_.observe(watched_.commanded_B, observed_B, sigma_B);
 }
 
 // ---- what is said

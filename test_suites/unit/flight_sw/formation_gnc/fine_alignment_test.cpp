@@ -168,7 +168,7 @@ TEST(ThrusterScaleTest, LearnsEachNozzleAndKnowsHowWell) {
         seen[axis] += pushed;
         seen = seen + pushed * tilt[nozzle];
       }
-      scale.observe(dv, seen, 10e-6);
+      scale.observe(dv, seen, vec3(10e-6, 10e-6, 10e-6));
     }
     for (int nozzle = 0; nozzle < ThrusterScale::kNozzles; ++nozzle) {
       const double error = scale.scale(nozzle) - truth[nozzle], sigma = scale.sigma(nozzle);
@@ -187,15 +187,15 @@ TEST(ThrusterScaleTest, LearnsEachNozzleAndKnowsHowWell) {
 
 TEST(ThrusterScaleTest, RefusesWhatTeachesNothing) {
   ThrusterScale scale;
-  const Vec3 dv = vec3(1e-3, 0, 0);
-  EXPECT_FALSE(scale.observe(Vec3(), dv, 1e-5));
-  EXPECT_FALSE(scale.observe(dv, vec3(NAN, 0, 0), 1e-5));
-  EXPECT_FALSE(scale.observe(dv, dv, 0.0));
-  EXPECT_FALSE(scale.observe(dv, Vec3(), 1e-5));  // did not happen: 40 sigma
+  const Vec3 dv = vec3(1e-3, 0, 0), fair = vec3(1e-5, 1e-5, 1e-5);
+  EXPECT_FALSE(scale.observe(Vec3(), dv, fair));
+  EXPECT_FALSE(scale.observe(dv, vec3(NAN, 0, 0), fair));
+  EXPECT_FALSE(scale.observe(dv, dv, Vec3()));
+  EXPECT_FALSE(scale.observe(dv, Vec3(), fair));  // did not happen: 40 sigma
   for (int nozzle = 0; nozzle < ThrusterScale::kNozzles; ++nozzle) {
     EXPECT_EQ(scale.scale(nozzle), 1.0);
   }
-  EXPECT_TRUE(scale.observe(dv, 1.03 * dv, 1e-6));
+  EXPECT_TRUE(scale.observe(dv, 1.03 * dv, 0.1 * fair));
   EXPECT_NEAR(scale.scale(0), 1.024, 1e-3);  // 0.02^2 / (0.02^2 + 0.01^2) of 0.03
   for (int other = 1; other < ThrusterScale::kNozzles; ++other) EXPECT_EQ(scale.scale(other), 1.0);
   EXPECT_NEAR(scale.command_for(dv)[0] * scale.scale(0), 1e-3, 1e-12);
