@@ -182,7 +182,7 @@ void fail_thrust_at_random(VisorsWorld& world, int instants, Duration begin, Dur
     const auto start = begin + std::chrono::duration_cast<Duration>(share * length);
     if (start > world.elapsed()) world.run_for(start - world.elapsed());
     const auto commanded = [&] { return burn.when > world.elapsed(); };
-    if (!world.run_until(commanded, 3h)) continue;  // the last ones are behind it
+    if (!world.run_until(commanded, 5h)) continue;  // the last ones are behind it
     std::vector<Branch> branches;
     for (const ThrustFault& fault : kThrustFaults) {
       const std::string name = std::string(fault.name) + "-at-" +

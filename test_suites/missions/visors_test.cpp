@@ -197,22 +197,22 @@ TEST(VisorsNavigationStatisticsTest, CovarianceAndInnovationsAreHonest) {
 
 namespace {
 
-/// The case study's dispersions: relative elements 5 m, mass 1 %, Cd 5 % of each, F10.7 10 %,
-/// 1 sigma. The thruster, clocks, links and noise are dispersed by their models.
-void disperse_transfer(VisorsWorld& world) {
+/// The case study's dispersions: mass 1 %, Cd 5 % of each, F10.7 10 %, 1 sigma, and relative
+/// elements by `sigma_m`. The thruster, clocks, links and noise are dispersed by their models.
+void disperse_models(VisorsWorld& world, const RelativeElements& start_m,
+                     const RelativeElements& sigma_m) {
   for (const char* name : {"dsc", "osc"}) {
     world.spacecraft(name)
         .disperse("mass_kg", Normal{11, 0.11})
         .disperse("drag_coefficient", Normal{2.2, 0.11});
   }
-  const RelativeElements start_m = missions::safe_ellipse_m(200);
   world.spacecraft("osc")
-      .disperse("roe/da_m", Normal{start_m.da, 5})
-      .disperse("roe/dl_m", Normal{start_m.dl, 5})
-      .disperse("roe/dex_m", Normal{start_m.dex, 5})
-      .disperse("roe/dey_m", Normal{start_m.dey, 5})
-      .disperse("roe/dix_m", Normal{start_m.dix, 5})
-      .disperse("roe/diy_m", Normal{start_m.diy, 5});
+      .disperse("roe/da_m", Normal{start_m.da, sigma_m.da})
+      .disperse("roe/dl_m", Normal{start_m.dl, sigma_m.dl})
+      .disperse("roe/dex_m", Normal{start_m.dex, sigma_m.dex})
+      .disperse("roe/dey_m", Normal{start_m.dey, sigma_m.dey})
+      .disperse("roe/dix_m", Normal{start_m.dix, sigma_m.dix})
+      .disperse("roe/diy_m", Normal{start_m.diy, sigma_m.diy});
   world.disperse("f107_sfu", Normal{150, 15});
 }
 
@@ -230,7 +230,7 @@ double bound_joint_mps(const RelativeElements& from_m, const RelativeElements& t
 void fly_transfer(RunId run) {
   const Duration begin = 1h, arrival = begin + 20h;
   VisorsWorld world(options_of(run));
-  disperse_transfer(world);
+  disperse_models(world, missions::safe_ellipse_m(200), {5, 5, 5, 5, 5, 5});
   world.command(10min, {.opcode = FORMATION_GNC_UPLOAD,
                         .mode = FORMATION_GNC_TRANSFER,
                         .number = 1,
@@ -284,13 +284,59 @@ TEST(VisorsTransferCampaign, ReachesTheScienceOrbitInTwentyHoursAtTheExpectedCos
 
 // ---- a science campaign
 
+// Dispersed as transfers are, and on the science orbit as well as they arrive.
 struct VisorsCampaignTest : VisorsTest {
   VisorsCampaignTest()
       : VisorsTest([] {
           FormationOptions options = in_science_orbit(GetParam());
           options.flight.config = "initial_mode=science\n";
           return options;
-        }()) {}
+        }()) {
+    disperse_models(*this, missions::science_orbit_m(), {0.5, 5, 1.5, 1.5, 1.5, 1.5});
+  }
+
+  // At each observation, and honest all the time: burns included. A few hours of one seed are few.
+  void judge_navigation() {
+    double worst_m = 0, worst_mps = 0;
+    for (const Observation& o : observations) {
+      const Duration begin = o.begin - missions::reference_epoch();
+      const Duration from = begin - 25s, until = begin + 35s;  // six estimates
+      worst_m = std::max(worst_m, position_rms_m(from, until));
+      worst_mps = std::max(worst_mps, velocity_rms_mps(from, until));
+    }
+    EXPECT_LE(worst_m, 5e-3);
+    EXPECT_LE(worst_mps, 4e-5);
+    std::printf("navigation at observations: at worst %.2f mm, %.4f mm/s RMS; normalised",
+                1e3 * worst_m, 1e3 * worst_mps);
+    for (int axis = 0; axis < 6; ++axis) {
+      const double rms = normalised_rms(axis, 30min, 50h);
+      std::printf(" %.2f", rms);
+      record_metric("normalised_rms_" + std::to_string(axis), rms);
+      EXPECT_GT(rms, 0.45);
+      EXPECT_LT(rms, 1.6);
+    }
+    std::printf("\n");
+  }
+  // What is learnt of each nozzle, against all that came out of it; shots differ by 1 %.
+  void judge_nozzles() {
+    std::printf("nozzles: delivered of what was commanded, as learnt:");
+    for (int nozzle = 0; nozzle < ColdGasThruster::kNozzles; ++nozzle) {
+      int shots = 0;
+      double commanded_Ns = 0, delivered_Ns = 0;
+      for (const ColdGasThruster::Shot& shot : thruster("osc").shot_log()) {
+        if (shot.nozzle != nozzle) continue;
+        ++shots;
+        commanded_Ns += missions::cold_gas_6().force_N * to_seconds(shot.on_time);
+        delivered_Ns += shot.impulse_Ns;
+      }
+      if (shots == 0) continue;
+      const double truth = delivered_Ns / commanded_Ns;
+      const double learnt = osc.nozzle_scale[nozzle], sigma = osc.sigma_nozzle_scale[nozzle];
+      std::printf(" %.4f, %.4f +- %.4f;", truth, learnt, sigma);
+      EXPECT_NEAR(learnt, truth, 4 * std::hypot(sigma, 0.01 / std::sqrt(shots))) << nozzle;
+    }
+    std::printf("\n");
+  }
 };
 
 // Two observations by default, the ten of the case study when --orrery_runs asks for its counts.
@@ -325,6 +371,8 @@ TEST_P(VisorsCampaignTest, ObservesEveryThirdOrbit) {
         1e3 * worst.longitudinal_error_m, 1e3 * worst.lateral_m, 1e3 * worst.lateral_mps,
         observations[k].good() ? ", good" : "");
   }
+  judge_navigation();
+  judge_nozzles();
   record_metric("observations", static_cast<double>(observations.size()));
   record_metric("good_observations", good_observations());
   record_metric("minimum_separation_m", minimum_separation_m);

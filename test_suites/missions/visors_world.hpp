@@ -94,25 +94,27 @@ struct VisorsWorld : FormationWorld {
                          {dr.x / sigma_r[0], dr.y / sigma_r[1], dr.z / sigma_r[2],
                           dv.x / sigma_v[0], dv.y / sigma_v[1], dv.z / sigma_v[2]}});
   }
-  double velocity_rms_mps(Duration from, Duration until) const {
+  /// Root mean square over the estimates of a span of something of each.
+  template <class What>
+  double rms_of_estimates(Duration from, Duration until, const What& what) const {
     double sum = 0;
     int count = 0;
     for (const EstimateError& e : estimates) {
       if (e.t < from || e.t >= until) continue;
-      sum += e.v_mps * e.v_mps;
+      sum += what(e) * what(e);
       ++count;
     }
     return count == 0 ? std::numeric_limits<double>::infinity() : std::sqrt(sum / count);
   }
+  double position_rms_m(Duration from, Duration until) const {
+    return rms_of_estimates(from, until, [](const EstimateError& e) { return e.r_m; });
+  }
+  double velocity_rms_mps(Duration from, Duration until) const {
+    return rms_of_estimates(from, until, [](const EstimateError& e) { return e.v_mps; });
+  }
   double normalised_rms(int axis, Duration from, Duration until) const {
-    double sum = 0;
-    int count = 0;
-    for (const EstimateError& e : estimates) {
-      if (e.t < from || e.t >= until) continue;
-      sum += e.normalised[axis] * e.normalised[axis];
-      ++count;
-    }
-    return count == 0 ? std::numeric_limits<double>::infinity() : std::sqrt(sum / count);
+    return rms_of_estimates(from, until,
+                            [axis](const EstimateError& e) { return e.normalised[axis]; });
   }
   void expose() {
     if (observations.empty() || now() < observations.back().begin ||
