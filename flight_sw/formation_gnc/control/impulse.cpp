@@ -31,13 +31,19 @@ Vec3 dv_rtn_from_eci(const StateEci& burning, const Vec3& dv_ECI) {
 
 Vec3 in_whole_on_times(const Vec3& dv_B, const ImpulseLimits& limits,
                        const ThrusterErrors& errors) {
+  const double most_mps = limits.max_mps * (1.0 - 1e-12);  // what the thruster's own sum may reach
+  const double size_mps = norm(dv_B);
+  double share = size_mps > limits.max_mps ? limits.max_mps / size_mps : 1.0;
   Vec3 rounded;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double size = std::fabs(dv_B[axis]);
-    double on = errors.quantum_mps * std::round(size / errors.quantum_mps);
-    if (size < limits.min_mps) on = size < 0.5 * limits.min_mps ? 0.0 : limits.min_mps;
-    rounded[axis] = std::copysign(on, dv_B[axis]);
-  }
+  do {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double size = share * std::fabs(dv_B[axis]);
+      double on = errors.quantum_mps * std::round(size / errors.quantum_mps);
+      if (size < limits.min_mps) on = size < 0.5 * limits.min_mps ? 0.0 : limits.min_mps;
+      rounded[axis] = std::copysign(on, dv_B[axis]);
+    }
+    share *= 1.0 - errors.quantum_mps / limits.max_mps;
+  } while (norm(rounded) > most_mps && share > 0.5);
   return rounded;
 }
 

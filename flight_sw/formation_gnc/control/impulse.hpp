@@ -36,7 +36,7 @@ flight_support::Vec3 dv_rtn_from_eci(const flight_support::StateEci& burning,
                                      const flight_support::Vec3& dv_ECI);
 
 /// What a command becomes: each component in whole on-times of its nozzle, none below half of
-/// `limits.min_mps`, that from there on.
+/// `limits.min_mps`, that from there on; together at most `limits.max_mps`, in the same direction.
 /// @param dv_B  Body axes.
 flight_support::Vec3 in_whole_on_times(const flight_support::Vec3& dv_B,
                                        const ImpulseLimits& limits, const ThrusterErrors& errors);

@@ -131,7 +131,8 @@ TEST(ThrusterScaleTest, OnTimesAreRoundedAsTheThrusterDoes) {
   const orrery::ColdGasThrusterOptions model;
   const double mass_kg = 11.0;
   for (int k = 0; k < 1000; ++k) {
-    const Vec3 dv = noise.normal3(k % 2 == 0 ? 1.2e-3 : 2e-5);
+    const Vec3 dv = noise.normal3(k % 2 == 0 ? 0.8e-3 : 2e-5);
+    if (norm(dv) > 2.99e-3) continue;
     const auto on =
         orrery::ColdGasThruster::on_times(mass_kg * orrery::Vec3{dv[0], dv[1], dv[2]}, model);
     const Vec3 rounded = in_whole_on_times(dv, ImpulseLimits(), ThrusterErrors());
@@ -139,6 +140,27 @@ TEST(ThrusterScaleTest, OnTimesAreRoundedAsTheThrusterDoes) {
       const auto along = static_cast<std::size_t>(2 * axis);
       const double on_s = orrery::to_seconds(on[along]) - orrery::to_seconds(on[along + 1]);
       EXPECT_NEAR(rounded[axis], model.force_N * on_s / mass_kg, 1e-12);
+    }
+  }
+}
+
+// A nozzle that gives less is commanded more: what is asked for is then cut, not refused.
+TEST(ThrusterScaleTest, WholeOnTimesStayBelowTheLargestBurn) {
+  Noise noise(6);
+  const ImpulseLimits limits;
+  const ThrusterErrors errors;
+  for (int k = 0; k < 2000; ++k) {
+    const Vec3 direction = noise.normal3(1.0);
+    const double size_mps = limits.max_mps * (0.98 + 0.0001 * k);
+    const Vec3 rounded =
+        in_whole_on_times((size_mps / norm(direction)) * direction, limits, errors);
+    EXPECT_LE(norm(rounded), limits.max_mps);
+    EXPECT_GE(norm(rounded), std::min(size_mps, limits.max_mps) - 3 * errors.quantum_mps);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double quanta = rounded[axis] / errors.quantum_mps;
+      EXPECT_NEAR(quanta, std::round(quanta), 1e-9);
+      if (std::abs(direction[axis]) < 0.05 * norm(direction)) continue;
+      EXPECT_NEAR(rounded[axis] / norm(rounded) * norm(direction) / direction[axis], 1, 0.02);
     }
   }
 }
