@@ -147,8 +147,11 @@ void Camera::from_flight(DeviceContext& io, Bytes bytes) {
   if (!is_default && !(exposure_s >= 1e-6 && exposure_s <= 100)) {
     return reject(io, "exposure of " + to_text(exposure_s) + " s; accepted: 1e-6 to 100");
   }
-  const std::int64_t ahead_ns = begin_ns - io.onboard_ns();
-  if (begin_ns < 0 || ahead_ns < 0) return reject(io, "begins in the past");
+  const std::int64_t onboard_ns = io.onboard_ns();
+  if (begin_ns < onboard_ns) return reject(io, "begins in the past");
+  if (begin_ns > onboard_ns + days(365).count()) {
+    return reject(io, "begins more than 365 days ahead");
+  }
   const Duration exposure = is_default ? options_.exposure : seconds(exposure_s);
   const SimTime at = std::max(io.now(), io.truth_of_onboard(begin_ns));
   io.after(at - io.now(), [this, &io, exposure] { begin(io, exposure); });

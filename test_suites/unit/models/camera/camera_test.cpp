@@ -171,14 +171,15 @@ TEST(CameraTest, RejectsWhatItCannotDoAndSaysWhy) {
   camera.from_flight(io, expose(now, 1e9));
   camera.from_flight(io, expose(now, std::nan("")));
   camera.from_flight(io, expose(INT64_MIN, 0.1));
+  camera.from_flight(io, expose(INT64_MAX, 0.1));
   camera.from_flight(io, ByteBuffer(7));
-  EXPECT_EQ(camera.rejected(), 5u);
+  EXPECT_EQ(camera.rejected(), 6u);
   camera.from_flight(io, expose(now, 2));
   camera.from_flight(io, expose(now + 1'000'000'000, 0.1));  // while the other is open
   io.run_for(10s);
-  EXPECT_EQ(camera.rejected(), 6u);
+  EXPECT_EQ(camera.rejected(), 7u);
   EXPECT_EQ(io.to_flight_log.size(), 1u);
-  EXPECT_EQ(io.texts.size(), 6u);
+  EXPECT_EQ(io.texts.size(), 7u);
   EXPECT_THAT(io.texts[1].text, HasSubstr("1e+09 s; accepted: 1e-6 to 100"));
 }
 
