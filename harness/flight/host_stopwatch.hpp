@@ -25,9 +25,9 @@ class HostStopwatch {
     const std::chrono::duration<double, std::nano> elapsed =
         std::chrono::steady_clock::now() - first_time_;
     sum_ -= last_;
-    last_ = static_cast<std::uint64_t>(static_cast<double>(to_ns(span)) *
-                                       static_cast<double>(ticks() - first_ticks_) /
-                                       elapsed.count());
+    last_ =
+        static_cast<std::uint64_t>(static_cast<double>(to_ns(span)) *
+                                   static_cast<double>(ticks() - first_ticks_) / elapsed.count());
     sum_ += last_;
   }
   std::uint64_t last_ticks() const { return last_; }

@@ -2,8 +2,8 @@
 //
 // Built once more for each of five defects that packages of this kind have had (Bell & D'Amico), so
 // that regression tests can show what catches them, FORMATION_GNC_DEFECT_ and:
-//   NO_RETRANSMISSION  here: transitions are sent once and not waited for; the passive side takes it
-//                      that it knows of each
+//   NO_RETRANSMISSION  here: transitions are sent once and not waited for; the passive side
+//                      takes it that it knows of each
 //   ORDERED_QUEUE      here: measurements are taken to arrive in the order sent
 //   SWAPPED_STATES     navigation/integer_resolution.cpp: a satellite is taken to have the same
 //                      channel, and so the same place in the covariance, in both receivers

@@ -1,4 +1,5 @@
-/* Its constructor tells on one descriptor that it has begun, and ends when it may read from another. */
+/* Its constructor tells on one descriptor that it has begun, and ends when it may read from
+ * another. */
 #include <stdlib.h>
 #include <unistd.h>
 
