@@ -154,10 +154,11 @@ void note_burn(VisorsWorld& world, Bytes bytes, LastBurn* burn) {
 
 // An escape that can burn ends on parallel e and i vectors of more than 80 m, with what its thrust
 // errors of 2 % leave of a*da, and coasts there. Its burns are 2.8 mm/s each, so it takes up to two
-// orbits from when it began: another one is flown, and more while it still burns.
+// orbits from when it began, and one more where that missed: two more are flown, and more while it
+// still burns.
 void expect_far_after_escape(VisorsWorld& world) {
   if (world.osc.mode != FORMATION_GNC_ESCAPE) return;
-  world.run_for(kOrbit);
+  world.run_for(2 * kOrbit);
   for (double before_mps = -1;
        world.delta_v_mps("osc") > before_mps && world.elapsed() < days(5);) {
     before_mps = world.delta_v_mps("osc");

@@ -21,6 +21,16 @@ double seconds_between(std::int64_t from_ns, std::int64_t to_ns) {
   return 1e-9 * static_cast<double>(to_ns - from_ns);
 }
 
+// An escape is planned anew when a*da is known so much better.
+constexpr double kSettled = 0.2;
+
+// At most: a*da is 2 / n of an error of velocity along track.
+double sigma_a_da_m(const Situation& now) {
+  const Matrix6& P = now.relative_covariance_RTN;
+  const double n_radps = mean_motion_radps(osculating_from_state(now.chief).a_m);
+  return 2.0 / n_radps * std::sqrt(std::max(0.0, P(3, 3) + P(4, 4) + P(5, 5)));
+}
+
 }  // namespace
 
 RelativeOrbit relative_orbit(const Situation& now) {
@@ -86,7 +96,7 @@ bool ManeuverManager::next(const Situation& now, Impulse* wanted) {
       if (now.t_ns >= replan_ns_) plan_science(now);
       break;
     case Mode::kEscape:
-      if (!planned_) plan_escape(now);
+      if (must_plan_escape(now)) plan_escape(now);
       break;
     default:
       return false;
@@ -119,6 +129,20 @@ void ManeuverManager::take(TransferPlan&& plan) {
   next_burn_ = 0;
 }
 
+bool ManeuverManager::must_plan_escape(const Situation& now) const {
+  if (!planned_) return true;
+  const double sigma_da_m = sigma_a_da_m(now);
+  if (escape_sigma_da_m_ > options_.escape_da_m && sigma_da_m < kSettled * escape_sigma_da_m_) {
+    return true;
+  }
+  const bool over = !plan_.usable() || next_burn_ == plan_.burns.size();
+  if (!over || now.t_ns < replan_ns_ || sigma_da_m > options_.escape_da_m) return false;
+  const RelativeElements a_roe = relative_orbit(now).a_roe;
+  return std::fabs(a_roe[kDa]) > options_.escape_da_m ||
+         std::hypot(a_roe[kDex], a_roe[kDey]) < options_.escape_m ||
+         std::hypot(a_roe[kDix], a_roe[kDiy]) < options_.escape_m;
+}
+
 // Nearly all of its burns are as large as the thruster allows.
 void ManeuverManager::plan_escape(const Situation& now) {
   SeparationOptions options;
@@ -126,6 +150,8 @@ void ManeuverManager::plan_escape(const Situation& now) {
   take(SeparationMonitor(options).escape(
       {now.t_ns, now.chief, now.deputy, now.relative_covariance_RTN}, soonest_ns(now)));
   planned_ = true;
+  escape_sigma_da_m_ = sigma_a_da_m(now);
+  replan_ns_ = after(now.t_ns, options_.escape_replan_s);
 }
 
 // The goal holds at the first observation after the arrival: what the orbit does until then is the

@@ -3,7 +3,10 @@
 /// Transfer    to the goal by the planner, anew every few hours with what navigation has learnt.
 /// Science     between observations likewise, to the science orbit of the next observation; in the
 ///             last 40 min trims by numerical prediction (fine_alignment.hpp).
-/// Escape      the escape of separation_monitor.hpp, within the thruster's limits as they are here.
+/// Escape      the escape of separation_monitor.hpp, within the thruster's limits as they are here,
+///             at once; anew when navigation knows the orbit far better than it did then (the burn
+///             that made it necessary may have been nobody's), and when the plan is over and left
+///             too small vectors or a drift.
 /// Standby, safe  nothing.
 /// A plan that cannot be made, or costs more than propellant allows, leaves the one before in
 /// force: that leads to the goal it had.
@@ -33,6 +36,9 @@ struct ManeuverOptions {
   double last_trim_s = 180.0;
   double planning_sigma_r_m = 1.0;    ///< 1-sigma, 3D, of the relative estimate that plans need
   double alignment_sigma_r_m = 0.05;  ///< and that trims need
+  double escape_m = 80.0;             ///< a*de and a*di of an escape that is over, at least
+  double escape_da_m = 4.0;           ///< and a*da, at most
+  double escape_replan_s = 300.0;     ///< between two plans of an escape
   int waypoints = 3;
 };
 
@@ -73,6 +79,7 @@ class ManeuverManager {
   void plan_transfer(const Situation& now);
   void plan_science(const Situation& now);
   void plan_escape(const Situation& now);
+  bool must_plan_escape(const Situation& now) const;
   void take(TransferPlan&& plan);
   void plan_to(const Situation& now, const TransferGoal& goal, std::int64_t last_ns);
   bool align(const Situation& now, Impulse* wanted);
@@ -90,6 +97,7 @@ class ManeuverManager {
   std::size_t next_burn_ = 0;
   bool planned_ = false, from_plan_ = false;
   std::int64_t replan_ns_ = 0, realign_ns_ = 0;
+  double escape_sigma_da_m_ = 0.0;  // when it was planned
   std::int64_t last_burn_ns_ = 0;
   std::uint32_t plans_ = 0;
   const char* trouble_ = nullptr;
