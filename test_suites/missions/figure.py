@@ -194,8 +194,8 @@ class Figure:
         self.parts.append(f"<line x1='{number(x0)}' y1='{number(y0)}' x2='{number(x1)}' "
                           f"y2='{number(y1)}' stroke='{colour}' stroke-width='{width}'/>")
 
-    def text(self, x, y, text, size=11, anchor="start", weight=None, turn=None):
-        self.parts.append(text_element(x, y, text, size, anchor, "#222", weight, turn))
+    def text(self, x, y, text, size=11, anchor="start", weight=None, turn=None, colour="#222"):
+        self.parts.append(text_element(x, y, text, size, anchor, colour, weight, turn))
 
     def write(self, path):
         frame = [f"<rect x='{number(a.box[0])}' y='{number(a.box[1])}' "

@@ -6,7 +6,8 @@
 BUILD is a build folder with the programs visors_test, regression_cone_program_memory and, for
 Table 5, bench_formation_gnc. Flights go to DIR (BUILD/case_study); --redraw takes those that are there.
 Equal counts give equal files; run times of Table 5 are measured, and so differ, and are taken anew
-only with --table5. Python 3.9, standard library.
+only with --table5. A flight that fails is drawn as it was, says so in its picture, and makes the
+command fail in the end. Python 3.9, standard library.
 """
 
 import argparse
@@ -43,8 +44,27 @@ def fly(program, tests, out, *flags):
                *flags]
     print(" ".join(command), flush=True)
     with open(out / "stdout.txt", "w", encoding="utf-8") as log:
-        if subprocess.run(command, stdout=log, stderr=subprocess.STDOUT, check=False).returncode:
-            sys.exit(f"make_page: failed, see {out / 'stdout.txt'}")
+        subprocess.run(command, stdout=log, stderr=subprocess.STDOUT, check=False)
+    text = output(out)
+    if "[==========]" not in text or "Global test environment tear-down" not in text:
+        sys.exit(f"make_page: did not end, see {out / 'stdout.txt'}")
+
+
+def output(out):
+    return (out / "stdout.txt").read_text(encoding="utf-8")
+
+
+def tests_of(text, verdict):
+    """Of the outcome of each test; the summary at the end says the names again, without a time."""
+    return re.findall(rf"^\[ *{verdict} *\] (\S+?),? .*\(\d+ ms\)$", text, re.MULTILINE)
+
+
+def note_red(figure, text, x=790, y=14):
+    """What failed in the flights of a picture, in it."""
+    red = tests_of(text, "FAILED")
+    if red:
+        figure.text(x, y, f"{len(red)} of {len(red) + len(tests_of(text, 'OK'))} tests failed",
+                    colour=RED, anchor="end")
 
 
 def fly_all(build, flights, runs, seeds):
@@ -103,6 +123,7 @@ def navigation_figure(flights):
         axes.line([(t, e[k]) for t, e, _ in samples], BLUE, 1.0, "error")
         if k == 0:
             axes.legend()
+    note_red(figure, output(flights / "single"))
     figure.write(PICTURES / "navigation.svg")
 
 
@@ -122,7 +143,7 @@ def transfer_figure(flights):
     runs = [json.loads(line) for line in open(folder_ / "runs.jsonl", encoding="utf-8")]
     runs.sort(key=lambda run: run["run"])
     delta_v = [run["metrics"]["delta_v_mps"] for run in runs]
-    text = (flights / "transfer/stdout.txt").read_text(encoding="utf-8")
+    text = output(flights / "transfer")
     joint, separate = map(float, re.search(r"bounds ([\d.]+) joint, ([\d.]+) separate",
                                            text).groups())
     low, width = 0.21, 0.0025
@@ -142,6 +163,7 @@ def transfer_figure(flights):
     axes.vertical(separate, GREEN, f"separate bound {separate:.4f}")
     axes.vertical(1.2 * separate, GREY, f"limit of the mean {1.2 * separate:.4f}", at_top=False,
                   anchor="end")
+    note_red(figure, text)
     figure.write(PICTURES / "transfer.svg")
     print(f"transfer: mean {mean:.4f} m/s, sigma {deviation:.4f}, {min(delta_v):.4f} to "
           f"{max(delta_v):.4f}, {sum(r['outcome'] == 'passed' for r in runs)} of {len(runs)} passed")
@@ -154,10 +176,10 @@ OBSERVATION = re.compile(r"observation +\d+ at +(\d+) s: longitudinal +(-?[\d.]+
 
 
 def science_figure(flights):
-    text = (flights / "science/stdout.txt").read_text(encoding="utf-8")
+    text = output(flights / "science")
     found = [(float(x), float(y), float(v), bool(good))
              for _, x, y, v, good in OBSERVATION.findall(text)]
-    seeds = text.count("[       OK ] Seeds/VisorsCampaignTest")
+    seeds = len(tests_of(text, "OK")) + len(tests_of(text, "FAILED"))
     figure = Figure(820, 400)
     left = figure.axes(70, 36, 330, 300, x_range=(-20, 20), y_range=(0, 24), x_step=5, y_step=6,
                        x_label="longitudinal error [mm]", y_label="lateral offset [mm]",
@@ -175,6 +197,7 @@ def science_figure(flights):
                         x_label="lateral velocity [mm/s]", y_label="observations", x_step=0.05)
     right.bars([width * k for k in range(45)], counts, BLUE)
     right.vertical(0.2, RED, "limit", anchor="end")
+    note_red(figure, text)
     figure.write(PICTURES / "observations.svg")
     print(f"science: {sum(g for *_, g in found)} of {len(found)} good, "
           f"{max(abs(x) for x, *_ in found)} mm, {max(f[1] for f in found)} mm, "
@@ -351,15 +374,18 @@ def table5(build):
     for one in result["benchmarks"]:
         if one["run_type"] == "iteration":
             unit = {"ns": 1e-3, "us": 1.0, "ms": 1e3}[one["time_unit"]]
-            times.setdefault(one["run_name"].split("_")[-1], []).append(one["cpu_time"] * unit)
+            times.setdefault(one["run_name"].split("_")[-1], []).append(
+                (one["cpu_time"] * unit, one["max_us"]))
     names = (("TimeUpdate", "time update"), ("GraphicUpdate", "GRAPHIC update"),
-             ("SdcpUpdate", "SDCP update"), ("IntegerResolution", "integer resolution"),
+             ("SdcpUpdate", "SDCP update"), ("IntegerResolution", "integer resolution (IAR)"),
              ("FilterEpoch", "whole epoch"))
-    lines = ["| per epoch of 12 satellites | median of ten repetitions [us] | slowest [us] |",
-             "|---|---|---|"]
+    lines = ["| per epoch of 12 satellites | mean [us] | mean of the slowest repetition | max [us] | "
+             "max of all |", "|---|---|---|---|---|"]
     for key, name in names:
-        values = sorted(times[key])
-        lines.append(f"| {name} | {values[len(values) // 2]:.1f} | {values[-1]:.1f} |")
+        means, longest = (sorted(values) for values in zip(*times[key]))
+        middle = len(means) // 2
+        lines.append(f"| {name} | {means[middle]:.1f} | {means[-1]:.1f} | {longest[middle]:.1f} | "
+                     f"{longest[-1]:.1f} |")
     page = HERE / "README.md"
     text = page.read_text(encoding="utf-8")
     head, rest = text.split("<!-- table 5 -->\n", 1)
@@ -386,6 +412,10 @@ def main():
         draw(flights)
     if options.table5:
         table5(options.build)
+    red = [name for part in ("single", "single_cone", "transfer", "science")
+           for name in tests_of(output(flights / part), "FAILED")]
+    if red:
+        sys.exit("make_page: drawn, but failed: " + ", ".join(red))
 
 
 if __name__ == "__main__":

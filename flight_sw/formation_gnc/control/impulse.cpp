@@ -9,14 +9,20 @@ using namespace flight_support;
 namespace {
 
 constexpr double kGate_sigma = 5.0;
-// Misalignment is a constant too, and so does not average out: two axes that each push as much as
-// the one in question, with either of two nozzles, leave it, weighted by size 0.8 of it.
-constexpr double kLasting = 0.8;
-// A component of less says nothing.
+// A burn of less says nothing.
 constexpr double kLeast_quanta = 5.0;
 
 int nozzle_of(int axis, double component) {
   return 2 * axis + (component < 0.0 ? 1 : 0);
+}
+
+// What each nozzle is asked for.
+Vector<ThrusterScale::kNozzles> loads_of(const Vec3& commanded_B) {
+  Vector<ThrusterScale::kNozzles> u;
+  for (int axis = 0; axis < 3; ++axis) {
+    u[nozzle_of(axis, commanded_B[axis])] = std::fabs(commanded_B[axis]);
+  }
+  return u;
 }
 
 }  // namespace
@@ -47,82 +53,81 @@ Vec3 in_whole_on_times(const Vec3& dv_B, const ImpulseLimits& limits,
   return rounded;
 }
 
-// Along dv the scale and the shot, across it the misalignment, and the rounding of on-times in all
-// axes: uniform over a quantum, of three nozzles.
-Mat3 maneuver_covariance(const Vec3& dv, const ThrusterErrors& errors) {
-  const double along2 = errors.scale * errors.scale + errors.shot_to_shot * errors.shot_to_shot;
-  const double across2 = errors.misalignment_rad * errors.misalignment_rad;
-  const double rounding2 = errors.quantum_mps * errors.quantum_mps / 12.0;
-  const Mat3 along = dv * transpose(dv);
-  return (along2 - across2) * along + (across2 * dot(dv, dv) + rounding2) * identity<3>();
-}
-
 ThrusterScale::ThrusterScale(const ThrusterErrors& errors) : errors_(errors) {
-  for (int nozzle = 0; nozzle < kNozzles; ++nozzle) {
-    scale_[nozzle] = 1.0;
-    variance_[nozzle] = errors.scale * errors.scale;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int nozzle = 0; nozzle < kNozzles; ++nozzle) {
+      const bool along = nozzle / 2 == axis;
+      const double sigma = along ? errors.scale : errors.misalignment_rad;
+      push_[axis][nozzle] = !along ? 0.0 : nozzle % 2 == 0 ? 1.0 : -1.0;
+      P_[axis](nozzle, nozzle) = sigma * sigma;
+    }
   }
 }
 
-// A component is scale c (1 + shot), what the others' misalignment adds, and noise. Its own enters
-// in second order only.
+// Of shots, and of rounding: uniform over a quantum. Shots of the other nozzles enter by their
+// misalignment, which is of second order.
+double ThrusterScale::noise2(const Vec3& commanded_B, int axis) const {
+  const double shot_mps = errors_.shot_to_shot * commanded_B[axis];
+  return shot_mps * shot_mps + errors_.quantum_mps * errors_.quantum_mps / 12.0;
+}
+
 bool ThrusterScale::observe(const Vec3& commanded_B, const Vec3& observed_B,
                             const Vec3& observed_sigma_B) {
   if (!is_finite(commanded_B) || !is_finite(observed_B)) return false;
-  bool learnt = false;
-  const double floor = kLasting * errors_.misalignment_rad, floor2 = floor * floor;
+  if (!(norm(commanded_B) > kLeast_quanta * errors_.quantum_mps)) return false;
+  const Vec6 u = loads_of(commanded_B);
+  Vec6 gain[3];
+  double innovation[3];
   for (int axis = 0; axis < 3; ++axis) {
-    const double c = commanded_B[axis];
     const double sigma_mps = observed_sigma_B[axis];
-    if (!(std::fabs(c) > kLeast_quanta * errors_.quantum_mps) || !(sigma_mps > 0.0)) continue;
-    const int nozzle = nozzle_of(axis, c);
-    const double across2 = dot(commanded_B, commanded_B) - c * c;
-    const double shot = errors_.shot_to_shot * scale_[nozzle];
-    const double noise2 =
-        (sigma_mps * sigma_mps + errors_.quantum_mps * errors_.quantum_mps / 12.0 +
-         errors_.misalignment_rad * errors_.misalignment_rad * across2) /
-            (c * c) +
-        shot * shot;
-    const double S = variance_[nozzle] + noise2;
-    const double innovation = observed_B[axis] / c - scale_[nozzle];
-    if (!(innovation * innovation <= kGate_sigma * kGate_sigma * S)) continue;
-    scale_[nozzle] += variance_[nozzle] / S * innovation;
-    variance_[nozzle] = std::fmax(variance_[nozzle] * noise2 / S, floor2);
-    learnt = true;
+    if (!(sigma_mps > 0.0)) return false;
+    const Vec6 Pu = P_[axis] * u;
+    const double S = dot(u, Pu) + sigma_mps * sigma_mps + noise2(commanded_B, axis);
+    innovation[axis] = observed_B[axis] - dot(u, push_[axis]);
+    if (!(innovation[axis] * innovation[axis] <= kGate_sigma * kGate_sigma * S)) return false;
+    gain[axis] = (1.0 / S) * Pu;
   }
-  return learnt;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vec6 Pu = P_[axis] * u;
+    push_[axis] = push_[axis] + innovation[axis] * gain[axis];
+    P_[axis] = symmetric(P_[axis] - gain[axis] * transpose(Pu));
+  }
+  return true;
+}
+
+double ThrusterScale::scale(int nozzle) const {
+  return std::fabs(push_[nozzle / 2][nozzle]);
 }
 
 double ThrusterScale::sigma(int nozzle) const {
-  return std::sqrt(variance_[nozzle]);
+  return std::sqrt(P_[nozzle / 2](nozzle, nozzle));
 }
 
+// Which nozzles fire is for the command to say, so it is found by correcting it.
 Vec3 ThrusterScale::command_for(const Vec3& wanted_B) const {
   Vec3 command_B;
   for (int axis = 0; axis < 3; ++axis) {
-    command_B[axis] = wanted_B[axis] / scale_[nozzle_of(axis, wanted_B[axis])];
+    command_B[axis] = wanted_B[axis] / scale(nozzle_of(axis, wanted_B[axis]));
+  }
+  for (int pass = 0; pass < 3; ++pass) {
+    const Vec3 missing_B = wanted_B - delivered(command_B);
+    command_B = command_B + missing_B;
   }
   return command_B;
 }
 
 Vec3 ThrusterScale::delivered(const Vec3& commanded_B) const {
-  Vec3 delivered_B;
-  for (int axis = 0; axis < 3; ++axis) {
-    delivered_B[axis] = commanded_B[axis] * scale_[nozzle_of(axis, commanded_B[axis])];
-  }
-  return delivered_B;
+  const Vec6 u = loads_of(commanded_B);
+  return vec3(dot(u, push_[0]), dot(u, push_[1]), dot(u, push_[2]));
 }
 
-ThrusterErrors ThrusterScale::errors(const Vec3& dv_B) const {
-  double sum = 0.0;
+Mat3 ThrusterScale::covariance(const Vec3& commanded_B) const {
+  const Vec6 u = loads_of(commanded_B);
+  Vec3 variance;
   for (int axis = 0; axis < 3; ++axis) {
-    const double c = dv_B[axis];
-    sum += c * c * variance_[nozzle_of(axis, c)];
+    variance[axis] = dot(u, P_[axis] * u) + noise2(commanded_B, axis);
   }
-  ThrusterErrors left = errors_;
-  const double size2 = dot(dv_B, dv_B);
-  if (size2 > 0.0) left.scale = std::sqrt(sum / size2);
-  return left;
+  return diagonal(variance);
 }
 
 }  // namespace formation_gnc

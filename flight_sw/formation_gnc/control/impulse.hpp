@@ -23,7 +23,7 @@ struct ImpulseLimits {
 
 /// 1-sigma of what a firing really does.
 struct ThrusterErrors {
-  double scale = 0.02;                ///< constant; less once it has been estimated
+  double scale = 0.02;                ///< constant
   double misalignment_rad = 8.7e-3;   ///< constant, 0.5 deg about each of two axes
   double shot_to_shot = 0.01;         ///< of the magnitude, anew at each firing
   double quantum_mps = 25e-6 / 11.0;  ///< on-times come in steps of 1 ms at 25 mN
@@ -41,17 +41,13 @@ flight_support::Vec3 dv_rtn_from_eci(const flight_support::StateEci& burning,
 flight_support::Vec3 in_whole_on_times(const flight_support::Vec3& dv_B,
                                        const ImpulseLimits& limits, const ThrusterErrors& errors);
 
-/// Covariance of a burn's execution [m^2/s^2], in the axes of `dv`: what navigation adds when the
-/// burn happens.
-flight_support::Mat3 maneuver_covariance(const flight_support::Vec3& dv,
-                                         const ThrusterErrors& errors);
-
-/// Estimates the factors between commanded and delivered delta-v: constants of six nozzles, along
-/// the axes of the body and against them, in the order +X -X +Y -Y +Z -Z.
+/// Estimates what six nozzles do: constants, along the axes of the body and against them, in the
+/// order +X -X +Y -Y +Z -Z.
 ///
-/// Six scalar Kalman filters, each on the component that its nozzle does. Shots differ by
-/// `shot_to_shot`, the other nozzles' misalignment adds to a component, and an observation is as
-/// good as navigation before and after the burn.
+/// Each pushes along its axis, by a scale, and across it, by its misalignment. A Kalman filter per
+/// axis of the body, of what each of the six adds to that axis; they are coupled, since nozzles
+/// fire together. Shots differ by `shot_to_shot`, and an observation is as good as navigation
+/// before and after the burn.
 class ThrusterScale {
  public:
   static constexpr int kNozzles = 6;
@@ -61,23 +57,28 @@ class ThrusterScale {
   /// @param commanded_B       What the thruster was asked for [m/s], body axes.
   /// @param observed_B        What navigation saw of it.
   /// @param observed_sigma_B  1-sigma per axis of that [m/s], above 0.
-  /// @return false if no component is anything to learn from: not finite, no burn, or more than
-  ///         5 sigma off.
+  /// @return false, and nothing learnt: not finite, no burn, or more than 5 sigma off in an axis.
   bool observe(const flight_support::Vec3& commanded_B, const flight_support::Vec3& observed_B,
                const flight_support::Vec3& observed_sigma_B);
 
-  double scale(int nozzle) const { return scale_[nozzle]; }  ///< delivered over commanded
+  /// Delivered over commanded, along the nozzle's axis.
+  double scale(int nozzle) const;
   double sigma(int nozzle) const;
   /// What to command so that `wanted_B` is delivered.
   flight_support::Vec3 command_for(const flight_support::Vec3& wanted_B) const;
   /// What comes of a command.
   flight_support::Vec3 delivered(const flight_support::Vec3& commanded_B) const;
-  /// The errors that remain of a burn: `scale` is that of the nozzles that do it.
-  ThrusterErrors errors(const flight_support::Vec3& dv_B) const;
+  /// Of what remains unknown of that [m^2/s^2]; axes of the body.
+  flight_support::Mat3 covariance(const flight_support::Vec3& commanded_B) const;
 
  private:
+  using Vec6 = flight_support::Vector<kNozzles>;
+
+  double noise2(const flight_support::Vec3& commanded_B, int axis) const;
+
   ThrusterErrors errors_;
-  double scale_[kNozzles], variance_[kNozzles];
+  Vec6 push_[3];  // by axis of the body: of each nozzle, per m/s that it is asked for
+  flight_support::Matrix<kNozzles, kNozzles> P_[3];
 };
 
 }  // namespace formation_gnc

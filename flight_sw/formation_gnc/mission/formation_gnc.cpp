@@ -65,8 +65,29 @@ Vec3 vec3_of(const double* v) {
   return vec3(v[0], v[1], v[2]);
 }
 
-Vec3 velocity_variances(const Matrix6& P) {
-  return vec3(P(3, 3), P(4, 4), P(5, 5));
+// Of the relative velocity in ECI, along the axes of the body. In the turning frame it would have
+// the error of the position in it.
+Vec3 velocity_variances(const FormationEstimate& e, const Mat3& R_BI) {
+  Mat3 P;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) P(r, c) = e.covariance(9 + r, 9 + c);
+  }
+  P = R_BI * P * transpose(R_BI);
+  return vec3(P(0, 0), P(1, 1), P(2, 2));
+}
+
+// What is alike in all axes across the burn, and what is more along it.
+Maneuver maneuver_of(const Impulse& expected, const Vec3& expected_B, const Mat3& P_B) {
+  Maneuver m;
+  m.who = Who::kSelf;
+  m.t_ns = expected.t_ns;
+  m.dv_ECI = expected.dv_ECI;
+  const double trace = P_B(0, 0) + P_B(1, 1) + P_B(2, 2), size2 = dot(expected_B, expected_B);
+  const double along2 = size2 > 0.0 ? dot(expected_B, P_B * expected_B) / size2 : trace / 3.0;
+  const double across2 = std::min(0.5 * (trace - along2), trace / 3.0);
+  m.sigma_mps = std::sqrt(across2);
+  m.more_along_mps = std::sqrt(std::max(0.0, along2 - across2));
+  return m;
 }
 
 double trace_of_position(const Matrix6& P) {
@@ -204,7 +225,9 @@ bool FormationGnc::take_maneuver(const Payload& payload) {
   maneuver.t_ns = reader.i64();
   for (int k = 0; k < 3; ++k) maneuver.dv_ECI[k] = reader.f64();
   maneuver.sigma_mps = reader.f64();
-  if (!reader.whole() || !is_finite(maneuver.dv_ECI) || !std::isfinite(maneuver.sigma_mps)) {
+  maneuver.more_along_mps = reader.f64();
+  if (!reader.whole() || !is_finite(maneuver.dv_ECI) || !std::isfinite(maneuver.sigma_mps) ||
+      !std::isfinite(maneuver.more_along_mps)) {
     return false;
   }
   navigation_.maneuver(maneuver);
@@ -433,16 +456,17 @@ void FormationGnc::command_burn(const Impulse& wanted) {
     out_.log(LogLevel::kError, "the thruster refused a burn");
     return;
   }
-  const Mat3 P = maneuver_covariance(expected_B, scale_.errors(expected_B));
-  const double sigma_mps = std::sqrt((P(0, 0) + P(1, 1) + P(2, 2)) / 3.0);
-  navigation_.maneuver(Who::kSelf, expected.t_ns, expected.dv_ECI, sigma_mps);
-  watch_burn(expected, R_BI, commanded_B, sigma_mps);
+  const Mat3 P_B = scale_.covariance(commanded_B);
+  const Maneuver maneuver = maneuver_of(expected, expected_B, P_B);
+  navigation_.maneuver(maneuver);
+  watch_burn(expected, R_BI, commanded_B, P_B);
   Payload notice;
   ByteWriter writer(notice.data, sizeof notice.data);
   writer.u8(kManeuverNotice);
   writer.i64(expected.t_ns);
   for (int k = 0; k < 3; ++k) writer.f64(expected.dv_ECI[k]);
-  writer.f64(sigma_mps);
+  writer.f64(maneuver.sigma_mps);
+  writer.f64(maneuver.more_along_mps);
   notice.bytes = writer.bytes();
   crosslink_.link().send(notice);  // a full window: the other's filter has to find out by itself
   delta_v_mps_ += norm(expected_B);
@@ -456,17 +480,17 @@ void FormationGnc::command_burn(const Impulse& wanted) {
 // ---- the thruster's scale: velocity predicted with the burn, against what navigation finds later
 
 void FormationGnc::watch_burn(const Impulse& expected, const Mat3& R_BI, const Vec3& commanded_B,
-                              double sigma_mps) {
+                              const Mat3& P_B) {
   if (watched_.waiting) return;
   watched_.look_ns = expected.t_ns + nanoseconds(kScaleLook_s);
   const FormationEstimate predicted = navigation_.at(watched_.look_ns);
   watched_.waiting = predicted.valid;
-  watched_.expected = expected.dv_ECI;
+  watched_.expected_B = R_BI * expected.dv_ECI;
   watched_.commanded_B = commanded_B;
   watched_.R_BI = R_BI;
   watched_.predicted_v = predicted.v_relative_ECI;
-  watched_.predicted_variance = velocity_variances(predicted.relative_covariance_RTN);
-  watched_.sigma_mps = sigma_mps;
+  watched_.predicted_variance_B = velocity_variances(predicted, R_BI);
+  watched_.of_burn_B = vec3(P_B(0, 0), P_B(1, 1), P_B(2, 2));
 }
 
 void FormationGnc::learn_scale(std::int64_t now_ns) {
@@ -477,24 +501,18 @@ void FormationGnc::learn_scale(std::int64_t now_ns) {
   if (!found.valid || !found.fixed) return;
   // What was found rests on the prediction too, burn included; what measurements alone say is
   // further off by before / (before - after), and as uncertain as their information makes it.
-  const Mat3 R_HI = eci_to_rtn({found.r_self_ECI, found.v_self_ECI});
-  const Vec3 after = velocity_variances(found.relative_covariance_RTN);
-  Vec3 change_RTN = R_HI * (found.v_relative_ECI - watched_.predicted_v), variance;
-  for (int k = 0; k < 3; ++k) {
-    const double before = watched_.predicted_variance[k];
-    if (!(after[k] < 0.9 * before)) return;
-    const double gain = before / (before - after[k]);
-    change_RTN[k] *= gain;
-    variance[k] = std::max(0.0, before - watched_.sigma_mps * watched_.sigma_mps) + gain * after[k];
-  }
-  const Mat3 R_BH = watched_.R_BI * transpose(R_HI);
-  Vec3 sigma_B;
+  const Vec3 after_B = velocity_variances(found, watched_.R_BI);
+  Vec3 change_B = watched_.R_BI * (found.v_relative_ECI - watched_.predicted_v), sigma_B;
   for (int axis = 0; axis < 3; ++axis) {
-    for (int k = 0; k < 3; ++k) sigma_B[axis] += R_BH(axis, k) * R_BH(axis, k) * variance[k];
-    sigma_B[axis] = std::sqrt(sigma_B[axis]);
+    const double before = watched_.predicted_variance_B[axis];
+    if (!(after_B[axis] < 0.9 * before)) return;
+    const double gain = before / (before - after_B[axis]);
+    change_B[axis] *= gain;
+    sigma_B[axis] =
+        std::sqrt(std::max(0.0, before - watched_.of_burn_B[axis]) + gain * after_B[axis]);
   }
-  const Vec3 observed_B = watched_.R_BI * watched_.expected - R_BH * change_RTN;
-  scale_.observe(watched_.commanded_B, observed_B, sigma_B);
+  // Self burns, and the velocity is other less self.
+  scale_.observe(watched_.commanded_B, watched_.expected_B - change_B, sigma_B);
 }
 
 // ---- what is said

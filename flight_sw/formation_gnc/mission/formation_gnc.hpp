@@ -100,11 +100,11 @@ class FormationGnc {
   struct Watched {
     bool waiting = false;
     std::int64_t look_ns = 0;
-    flight_support::Vec3 expected, predicted_v;  // ECI; the latter of other less self
-    flight_support::Vec3 commanded_B;
-    flight_support::Mat3 R_BI;                // in the middle of the burn
-    flight_support::Vec3 predicted_variance;  // of the relative velocity, RTN
-    double sigma_mps = 0.0;                   // of the burn's execution, per axis
+    flight_support::Vec3 commanded_B, expected_B;
+    flight_support::Vec3 predicted_v;           // of other less self, ECI
+    flight_support::Mat3 R_BI;                  // in the middle of the burn
+    flight_support::Vec3 predicted_variance_B;  // of that velocity, burn included
+    flight_support::Vec3 of_burn_B;             // variance of its execution
   };
 
   bool is_deputy() const { return configuration_.role == Role::kDeputy; }
@@ -130,7 +130,7 @@ class FormationGnc {
   void maneuver(const FormationEstimate& estimate);
   void command_burn(const Impulse& wanted);
   void watch_burn(const Impulse& expected, const flight_support::Mat3& R_BI,
-                  const flight_support::Vec3& commanded_B, double sigma_mps);
+                  const flight_support::Vec3& commanded_B, const flight_support::Mat3& P_B);
   void learn_scale(std::int64_t now_ns);
   void send_due(std::int64_t now_ns);
   void schedule(std::int64_t now_ns, std::int64_t now_onboard_ns);

@@ -75,22 +75,23 @@ EmpiricalAcceleration FormationFilter::empirical_self() const {
   return e;
 }
 
-// Along track drag, which lasts: gravity and radiation are white noise of the same effect there.
+// States are what lasts: drag along track, and radiation, which stands still in inertial space and
+// so along the normal. Omitted gravity is white noise of the same effect.
 EmpiricalAcceleration FormationFilter::empirical_difference() const {
-  constexpr int kAlong = 1;
+  constexpr int kAlong = 1, kNormal = 2;
   const Mat3 R_IH = rtn_to_eci(orbits_.r[kSelf], orbits_.v[kSelf]);
   const Vec3 separation = transpose(R_IH) * (orbits_.r[kOther] - orbits_.r[kSelf]);
   EmpiricalAcceleration e;
   for (int k = 0; k < 3; ++k) {
-    double variance = square(options_.radiation_difference_mps2);
+    double gravity = 0.0;
     for (int j = 0; j < 3; ++j) {
-      variance += square(options_.omitted_gradient_factor * kOmittedGradient[k][j] * separation[j]);
+      gravity += square(options_.omitted_gradient_factor * kOmittedGradient[k][j] * separation[j]);
     }
-    e.sigma_mps2[k] = std::sqrt(variance);
-    e.tau_s[k] = options_.empirical_tau_s;
+    e.white_m2ps3[k] = 2.0 * gravity * options_.empirical_tau_s;
+    e.sigma_mps2[k] = options_.radiation_difference_mps2;
+    e.tau_s[k] = k == kNormal ? options_.drag_tau_s : options_.radiation_tau_s;
   }
-  e.white_m2ps3[kAlong] = 2.0 * square(e.sigma_mps2[kAlong]) * options_.empirical_tau_s;
-  e.sigma_mps2[kAlong] = options_.drag_difference_mps2;
+  e.sigma_mps2[kAlong] = std::hypot(e.sigma_mps2[kAlong], options_.drag_difference_mps2);
   e.tau_s[kAlong] = options_.drag_tau_s;
   return e;
 }
@@ -197,13 +198,22 @@ void FormationFilter::push(const OrbitTransition& self, const OrbitTransition& d
 void FormationFilter::apply_maneuver(const Maneuver& m, double share) {
   const int who = static_cast<int>(m.who);
   orbits_.v[who] = orbits_.v[who] + share * m.dv_ECI;
-  const double variance = share * m.sigma_mps * m.sigma_mps;
+  const double of_other = who == kSelf ? -1.0 : 1.0;
   for (int k = 0; k < 3; ++k) {
     double g[kStates] = {};
-    g[kVelocityDifference + k] = who == kSelf ? -1.0 : 1.0;
+    g[kVelocityDifference + k] = of_other;
     if (who == kSelf) g[kVelocitySelf + k] = 1.0;
-    ud_.add(variance, g, kVelocityDifference + k);
+    ud_.add(share * square(m.sigma_mps), g, kVelocityDifference + k);
   }
+  const double size_mps = norm(m.dv_ECI);
+  if (!(m.more_along_mps > 0.0) || !(size_mps > 0.0)) return;
+  double g[kStates] = {};
+  for (int k = 0; k < 3; ++k) {
+    const double along = m.dv_ECI[k] / size_mps;
+    g[kVelocityDifference + k] = of_other * along;
+    if (who == kSelf) g[kVelocitySelf + k] = along;
+  }
+  ud_.add(share * square(m.more_along_mps), g, kVelocityDifference + 2);
 }
 
 }  // namespace formation_gnc

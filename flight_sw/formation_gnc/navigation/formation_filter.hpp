@@ -39,12 +39,15 @@ struct FilterOptions {
   /// and trenches.
   double empirical_sigma_mps2 = 1e-5;
   double empirical_tau_s = 200.0;  ///< at least four steps
-  /// Of the difference. Drag, along track: 2.5 % of 1.2e-7 m/s^2 (550 km, 150 sfu, 0.012 m^2/kg),
-  /// over an orbit. Radiation pressure, each axis: 1 % of 4.5e-8 m/s^2. Gravity that the field
-  /// omits: kOmittedGradient, times the separation and this factor.
-  double drag_difference_mps2 = 3e-9;
+  /// Of the difference. Drag, along track: 7 % (drag coefficients known to 5 % each, masses to 1 %)
+  /// of 1.2e-7 m/s^2 (550 km, 150 sfu, 0.012 m^2/kg), over an orbit. Radiation pressure, each axis:
+  /// 2 % (masses and reflectivities to 1 % each) of 4.5e-8 m/s^2, along R over the sixth of an
+  /// orbit in which the Sun turns by a radian, along N over an orbit. Gravity that the field omits:
+  /// kOmittedGradient, times the separation and this factor.
+  double drag_difference_mps2 = 8.6e-9;
   double drag_tau_s = 5700.0;
-  double radiation_difference_mps2 = 4.5e-10;
+  double radiation_difference_mps2 = 9e-10;
+  double radiation_tau_s = 900.0;
   double omitted_gradient_factor = 1.0;
 
   Vec3 lever_arm_B = flight_support::vec3(0.05, 0.0, 0.10);  ///< antenna from centre of mass [m]

@@ -12,7 +12,8 @@ constexpr double kMostDuration_s = 600.0, kMostDv_mps = 100.0;
 // Written so that NaN fails.
 bool is_plausible(const Maneuver& m) {
   return m.t_ns > 0 && m.duration_s >= 0.0 && m.duration_s <= kMostDuration_s &&
-         norm(m.dv_ECI) <= kMostDv_mps && m.sigma_mps >= 0.0 && m.sigma_mps <= kMostDv_mps;
+         norm(m.dv_ECI) <= kMostDv_mps && m.sigma_mps >= 0.0 && m.sigma_mps <= kMostDv_mps &&
+         m.more_along_mps >= 0.0 && m.more_along_mps <= kMostDv_mps;
 }
 
 struct Interval {

@@ -15,6 +15,7 @@ struct Maneuver {
   double duration_s = 0.0;      ///< valves open, 0 to 600; spread evenly over that time
   flight_support::Vec3 dv_ECI;  ///< [m/s]
   double sigma_mps = 0.0;       ///< per axis, of the execution
+  double more_along_mps = 0.0;  ///< and as an error of its own along dv_ECI
 };
 
 /// The latest ones, by time; of bounded number, so that old ones make room for new ones.

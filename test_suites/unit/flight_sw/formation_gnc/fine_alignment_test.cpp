@@ -96,28 +96,42 @@ TEST(OrbitPredictionTest, RelativeMotionAsksForAField) {
   EXPECT_NEAR(std::log2(twenty / 0.12), 0.0, 1.0) << twenty;
 }
 
-// The covariance against the model it stands for: constant scale and misalignment, shots, rounding.
-// 20000 samples tell a variance to 1 %; 5 sigma.
-TEST(ThrusterErrorsTest, CovarianceIsThatOfExecutedBurns) {
-  const ThrusterErrors errors;
+// Six nozzles as the models of thrusters have them: constant scale and misalignment of each, shots.
+struct TrueNozzles {
+  explicit TrueNozzles(Noise& noise) {
+    const ThrusterErrors errors;
+    for (int nozzle = 0; nozzle < ThrusterScale::kNozzles; ++nozzle) {
+      scale[nozzle] = 1.0 + errors.scale * noise.normal();
+      tilt[nozzle] = noise.normal3(errors.misalignment_rad);
+      tilt[nozzle][nozzle / 2] = 0.0;
+    }
+  }
+  Vec3 fire(const Vec3& dv, Noise& noise) const {
+    Vec3 done;
+    for (int axis = 0; axis < 3; ++axis) {
+      const int nozzle = 2 * axis + (dv[axis] < 0.0 ? 1 : 0);
+      const double pushed = scale[nozzle] * (1.0 + 0.01 * noise.normal()) * std::abs(dv[axis]);
+      done[axis] += nozzle % 2 == 0 ? pushed : -pushed;
+      done = done + pushed * tilt[nozzle];
+    }
+    return done;
+  }
+  double scale[ThrusterScale::kNozzles];
+  Vec3 tilt[ThrusterScale::kNozzles];  // what each pushes across, per m/s
+};
+
+// The covariance against burns by other thrusters and other shots. 20000 samples tell a variance to
+// 1 %; 6 sigma.
+TEST(ThrusterScaleTest, CovarianceIsThatOfExecutedBurns) {
   const Vec3 dv = vec3(1.2e-3, -0.4e-3, 0.7e-3);
-  const Vec3 along = (1.0 / norm(dv)) * dv, helper = vec3(0, 0, 1);
-  const Vec3 p = (1.0 / norm(cross(along, helper))) * cross(along, helper), q = cross(along, p);
   Noise noise(5);
   Mat3 sum;
   const int samples = 20000;
   for (int k = 0; k < samples; ++k) {
-    const double scale = 1.0 + errors.scale * noise.normal();
-    const double shot = 1.0 + errors.shot_to_shot * noise.normal();
-    const double tilt_p = errors.misalignment_rad * noise.normal();
-    const double tilt_q = errors.misalignment_rad * noise.normal();
-    Vec3 done = (scale * shot * norm(dv)) * (along + tilt_p * p + tilt_q * q);
-    for (int axis = 0; axis < 3; ++axis) {
-      done[axis] = errors.quantum_mps * std::round(done[axis] / errors.quantum_mps);
-    }
+    const Vec3 done = TrueNozzles(noise).fire(dv, noise);
     sum = sum + (done - dv) * transpose(done - dv);
   }
-  const Mat3 said = maneuver_covariance(dv, errors);
+  const Mat3 said = ThrusterScale().covariance(dv);
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) {
       EXPECT_NEAR(sum(r, c) / samples, said(r, c), 0.06 * std::sqrt(said(r, r) * said(c, c)));
@@ -166,45 +180,53 @@ TEST(ThrusterScaleTest, WholeOnTimesStayBelowTheLargestBurn) {
 }
 
 // Over 200 thrusters: thirty burns of 2 mm/s, seen to 10 um/s. Each nozzle does half of a component
-// of some 1 mm/s. Fifteen shots of 1 % and as much noise make 0.4 %, the others' misalignment of
-// 0.87 %, which lasts, 0.6 %; and the estimator knows how well it knows. Seen: 0.77 %, 0.70 % said.
+// of some 1 mm/s. Fifteen shots of 1 % and as much noise make 0.4 %; the estimator knows how well
+// it knows, and that of what a burn will do.
 TEST(ThrusterScaleTest, LearnsEachNozzleAndKnowsHowWell) {
-  double squares = 0.0, normalised = 0.0, said = 0.0;
+  double squares = 0.0, normalised = 0.0, said = 0.0, of_burn = 0.0;
   const int thrusters = 200;
   for (int k = 0; k < thrusters; ++k) {
     Noise noise(100 + static_cast<std::uint64_t>(k));
-    double truth[ThrusterScale::kNozzles];
-    Vec3 tilt[ThrusterScale::kNozzles];  // what each pushes across, per m/s
-    for (int nozzle = 0; nozzle < ThrusterScale::kNozzles; ++nozzle) {
-      truth[nozzle] = 1.0 + 0.02 * noise.normal();
-      tilt[nozzle] = noise.normal3(8.7e-3);
-      tilt[nozzle][nozzle / 2] = 0.0;
-    }
+    const TrueNozzles truth(noise);
     ThrusterScale scale;
     for (int burn = 0; burn < 30; ++burn) {
       const Vec3 dv = noise.normal3(1.2e-3);
-      Vec3 seen = noise.normal3(10e-6);
-      for (int axis = 0; axis < 3; ++axis) {
-        const int nozzle = 2 * axis + (dv[axis] < 0.0 ? 1 : 0);
-        const double pushed = truth[nozzle] * (1.0 + 0.01 * noise.normal()) * dv[axis];
-        seen[axis] += pushed;
-        seen = seen + pushed * tilt[nozzle];
-      }
-      scale.observe(dv, seen, vec3(10e-6, 10e-6, 10e-6));
+      scale.observe(dv, truth.fire(dv, noise) + noise.normal3(10e-6), vec3(10e-6, 10e-6, 10e-6));
     }
     for (int nozzle = 0; nozzle < ThrusterScale::kNozzles; ++nozzle) {
-      const double error = scale.scale(nozzle) - truth[nozzle], sigma = scale.sigma(nozzle);
+      const double error = scale.scale(nozzle) - truth.scale[nozzle], sigma = scale.sigma(nozzle);
       squares += error * error;
       normalised += error * error / (sigma * sigma);
       said += sigma;
     }
+    const Vec3 dv = noise.normal3(1.2e-3);
+    const Vec3 missed = truth.fire(dv, noise) - scale.delivered(dv);
+    const Mat3 P = scale.covariance(dv);
+    for (int axis = 0; axis < 3; ++axis) of_burn += missed[axis] * missed[axis] / P(axis, axis);
   }
   const int nozzles = thrusters * ThrusterScale::kNozzles;
-  EXPECT_LT(std::sqrt(squares / nozzles), 0.009);
-  EXPECT_LT(said / nozzles, 0.008);
-  EXPECT_NEAR(std::sqrt(normalised / nozzles), 1.0,
-              0.15);                               // 5 sigma of 1200 samples are 0.1; seen 1.10
+  printf("seen %.4f, said %.4f, normalised %.3f, of a burn %.3f\n", std::sqrt(squares / nozzles),
+         said / nozzles, std::sqrt(normalised / nozzles), std::sqrt(of_burn / (3 * thrusters)));
+  EXPECT_LT(std::sqrt(squares / nozzles), 0.006);
   EXPECT_GT(std::sqrt(squares / nozzles), 0.002);  // shots of 1 % say no more
+  // 5 sigma of 1200 and 600 samples.
+  EXPECT_NEAR(std::sqrt(normalised / nozzles), 1.0, 0.1);
+  EXPECT_NEAR(std::sqrt(of_burn / (3 * thrusters)), 1.0, 0.15);
+}
+
+// A nozzle that leans is made up for by the others.
+TEST(ThrusterScaleTest, CommandsWhatTakesTheMisalignmentBack) {
+  Noise noise(9);
+  const TrueNozzles truth(noise);
+  ThrusterScale scale;
+  for (int burn = 0; burn < 200; ++burn) {
+    const Vec3 dv = noise.normal3(1.2e-3);
+    scale.observe(dv, truth.fire(dv, noise), vec3(1e-6, 1e-6, 1e-6));
+  }
+  const Vec3 wanted = vec3(-2e-3, 0, 0), command = scale.command_for(wanted);
+  EXPECT_LT(norm(scale.delivered(command) - wanted), 1e-8);
+  const Vec3 plain = truth.fire(wanted, noise), done = truth.fire(command, noise);
+  EXPECT_LT(std::hypot(done[1], done[2]), 0.3 * std::hypot(plain[1], plain[2]));
 }
 
 TEST(ThrusterScaleTest, RefusesWhatTeachesNothing) {
@@ -222,9 +244,6 @@ TEST(ThrusterScaleTest, RefusesWhatTeachesNothing) {
   for (int other = 1; other < ThrusterScale::kNozzles; ++other) EXPECT_EQ(scale.scale(other), 1.0);
   EXPECT_NEAR(scale.command_for(dv)[0] * scale.scale(0), 1e-3, 1e-12);
   EXPECT_EQ(scale.command_for(-1.0 * dv)[0], -1e-3);  // another nozzle
-  EXPECT_EQ(scale.errors(dv).scale, scale.sigma(0));
-  EXPECT_NEAR(scale.errors(vec3(1e-3, -1e-3, 0)).scale,
-              std::hypot(scale.sigma(0), 0.02) / std::sqrt(2.0), 1e-12);
 }
 
 // Both spacecraft on the way to an observation, `before_s` ahead of it; the optics spacecraft off
