@@ -446,6 +446,10 @@ void FormationGnc::command_burn(const Impulse& wanted) {
   // Already as the thruster will round it, so that the filters hear of what is really done.
   const Vec3 commanded_B =
       in_whole_on_times(scale_.command_for(R_BI * wanted.dv_ECI), options.limits, options.errors);
+  if (!(norm(commanded_B) > 0.0)) {  // less than half of the smallest, in each axis
+    maneuvers_.commanded(wanted, false);
+    return;
+  }
   const Vec3 commanded = transpose(R_BI) * commanded_B, expected_B = scale_.delivered(commanded_B);
   const Impulse expected{wanted.t_ns, transpose(R_BI) * expected_B};
   const double dv[3] = {commanded[0], commanded[1], commanded[2]};
