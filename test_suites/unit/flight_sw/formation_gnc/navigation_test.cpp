@@ -32,7 +32,8 @@ TEST(NavigationTest, IsAccurateAndHonest) {
     EXPECT_LT(flight.rms(&Errors::v_mps, 180), 4e-5) << seed;
     EXPECT_LT(flight.rms(&Errors::absolute_m, 180), 4) << seed;
     EXPECT_NEAR(flight.chi2 / flight.innovations, 1, 0.1) << seed;
-    EXPECT_GT(flight.inside, 0.92 * flight.judged) << seed;  // 95 %, 270 epochs: 2 sigmas below
+    // 95 %, 270 epochs: 2 sigmas below, of many seeds 4.
+    EXPECT_GT(flight.inside, (runs < 20 ? 0.92 : 0.897) * flight.judged) << seed;
     EXPECT_LT(flight.rejected, 5) << seed;
     for (std::size_t k = 60; k < flight.errors.size(); ++k) {
       for (int axis = 0; axis < 6; ++axis) {
