@@ -9,8 +9,8 @@ file(CREATE_LINK ${PROJECT_SOURCE_DIR}/fixtures/orrery.hpp ${ORRERY_INCLUDE_ROOT
   SYMBOLIC)
 
 # ORRERY_UNITY: compiling sources in batches takes a third of the time, since what they share is parsed and
-# instantiated once. Names in unnamed namespaces may then meet; sources with such names stand apart. One
-# build should be OFF or TESTS: it shows that each source of the libraries includes what it uses.
+# instantiated once. Names in unnamed namespaces may then meet; sources with such names stand apart. With OFF
+# or TESTS a build shows that each source of the libraries includes what it uses.
 set(ORRERY_UNITY OFF CACHE STRING "Compile in batches: OFF, TESTS (test sources alone) or ON")
 set_property(CACHE ORRERY_UNITY PROPERTY STRINGS OFF TESTS ON)
 function(orrery_compile_in_batches target)

@@ -3,6 +3,7 @@
 #include <orrery/harness/flight/floating_point.hpp>
 #include <orrery/harness/flight/virtual_services.hpp>
 #include <orrery/harness/heap/interposition.hpp>
+#include <orrery/harness/kernel/sanitizers.hpp>
 #include <orrery/harness/kernel/sim_state.hpp>
 
 #include <algorithm>
@@ -28,14 +29,7 @@
 #include <unistd.h>
 #include <unwind.h>
 
-#if defined(__SANITIZE_ADDRESS__)
-#define ORRERY_LEAK_SANITIZER
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define ORRERY_LEAK_SANITIZER
-#endif
-#endif
-#ifdef ORRERY_LEAK_SANITIZER
+#ifdef ORRERY_ADDRESS_SANITIZER
 #include <sanitizer/lsan_interface.h>
 #endif
 
@@ -468,11 +462,11 @@ bool run_contained(ContainedProcess& process, void (*function)(void*), void* arg
   bool returned = false;
   {
     const HeapGuard guard(process.heap);
-#ifdef ORRERY_LEAK_SANITIZER
+#ifdef ORRERY_ADDRESS_SANITIZER
     __lsan_disable();  // what a dead process had allocated is not a leak
 #endif
     returned = call_or_crash(call);
-#ifdef ORRERY_LEAK_SANITIZER
+#ifdef ORRERY_ADDRESS_SANITIZER
     __lsan_enable();
 #endif
   }

@@ -5,6 +5,7 @@
 #include <orrery/harness/flight/non_volatile_memory.hpp>
 #include <orrery/harness/flight/virtual_services.hpp>
 #include <orrery/harness/heap/interposition.hpp>
+#include <orrery/harness/kernel/sanitizers.hpp>
 
 #include <cstdio>
 #include <map>
@@ -12,19 +13,10 @@
 #include <string>
 #include <vector>
 
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define ORRERY_SANITIZER_OPENS_FILES
-#endif
-#endif
-#if defined(__SANITIZE_ADDRESS__)
-#define ORRERY_SANITIZER_OPENS_FILES
-#endif
-
 namespace orrery::internal {
 
 // To print where an error was, a sanitizer opens files from within flight code.
-#ifdef ORRERY_SANITIZER_OPENS_FILES
+#ifdef ORRERY_ADDRESS_SANITIZER
 inline constexpr bool kCanRefuse = false;
 #else
 inline constexpr bool kCanRefuse = true;

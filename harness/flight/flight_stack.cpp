@@ -1,5 +1,6 @@
 #include <orrery/harness/flight/flight_stack.hpp>
 #include <orrery/harness/kernel/hash.hpp>
+#include <orrery/harness/kernel/sanitizers.hpp>
 
 #include <bitset>
 #include <cerrno>
@@ -10,13 +11,6 @@
 #include <sys/mman.h>
 #include <vector>
 
-#if defined(__SANITIZE_ADDRESS__)
-#define ORRERY_ADDRESS_SANITIZER
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define ORRERY_ADDRESS_SANITIZER
-#endif
-#endif
 #if defined(__x86_64__) && !defined(ORRERY_ADDRESS_SANITIZER)
 #define ORRERY_SWITCHES_STACKS
 #endif

@@ -1,5 +1,6 @@
 #include <orrery/harness/flight/globals_watch.hpp>
 #include <orrery/harness/flight/library_closure.hpp>
+#include <orrery/harness/kernel/sanitizers.hpp>
 
 #include <algorithm>
 #include <cstdio>
@@ -13,7 +14,7 @@ namespace {
 
 // What lies between a library's variables is forbidden ground under AddressSanitizer, to memcpy and
 // memcmp as well; a function of our own may read it.
-#ifdef __SANITIZE_ADDRESS__
+#ifdef ORRERY_ADDRESS_SANITIZER
 [[gnu::no_sanitize_address]] void flip(volatile std::byte* at, int bit) {
   *at = *at ^ (std::byte{1} << bit);
 }

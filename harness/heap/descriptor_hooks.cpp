@@ -1,6 +1,7 @@
 // dup, fcntl, mmap, mkstemp, chdir and their kin for a test program, as file_hooks.cpp.
 
 #include <orrery/harness/heap/file_call.hpp>
+#include <orrery/harness/kernel/sanitizers.hpp>
 
 #include <climits>
 #include <cstdarg>
@@ -12,16 +13,6 @@
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || \
-    __has_feature(memory_sanitizer)
-#define ORRERY_SANITIZER_OWNS_MMAP
-#endif
-#endif
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define ORRERY_SANITIZER_OWNS_MMAP
-#endif
 
 extern "C" const char* orrery_descriptor_hook_not_taken(std::size_t index);
 
@@ -79,7 +70,7 @@ ORRERY_HOOK int fcntl64(int fd, int command, ...) {
 
 // ---- mappings
 
-#ifndef ORRERY_SANITIZER_OWNS_MMAP
+#ifndef ORRERY_SANITIZER_OWNS_MALLOC
 
 // The system's answer may look negative: addresses have the upper half of the words only there.
 #define ORRERY_MAP_CALL(name)                                                            \
@@ -211,7 +202,7 @@ extern "C" const char* orrery_descriptor_hook_not_taken(std::size_t index) {
       ORRERY_ENTRY(mkdtemp),   ORRERY_ENTRY(tmpfile),  ORRERY_ENTRY(tmpfile64),
       ORRERY_ENTRY(freopen),   ORRERY_ENTRY(chdir),    ORRERY_ENTRY(fchdir),
       ORRERY_ENTRY(getcwd),    ORRERY_ENTRY(realpath),
-#ifndef ORRERY_SANITIZER_OWNS_MMAP
+#ifndef ORRERY_SANITIZER_OWNS_MALLOC
       ORRERY_ENTRY(mmap),      ORRERY_ENTRY(mmap64),   ORRERY_ENTRY(munmap),
 #endif
   };

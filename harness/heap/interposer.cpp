@@ -6,22 +6,13 @@
 
 #include <orrery/harness/heap/interposition.hpp>
 #include <orrery/harness/heap/simulated_heap.hpp>
+#include <orrery/harness/kernel/sanitizers.hpp>
 
 #include <cerrno>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <dlfcn.h>
-
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || \
-    __has_feature(memory_sanitizer)
-#define ORRERY_SANITIZER_OWNS_MALLOC
-#endif
-#endif
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define ORRERY_SANITIZER_OWNS_MALLOC
-#endif
 
 #ifdef ORRERY_SANITIZER_OWNS_MALLOC
 

@@ -3,6 +3,7 @@
 // of orrery::allocator (interposer.cpp), for the same reasons an object file of the executable.
 
 #include <orrery/harness/heap/interposition.hpp>
+#include <orrery/harness/kernel/sanitizers.hpp>
 
 #include <cerrno>
 #include <cstddef>
@@ -17,17 +18,7 @@
 #include <type_traits>
 #include <unistd.h>
 
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || \
-    __has_feature(memory_sanitizer)
-#define ORRERY_SANITIZER_OWNS_SERVICES
-#endif
-#endif
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define ORRERY_SANITIZER_OWNS_SERVICES
-#endif
-
-#ifndef ORRERY_SANITIZER_OWNS_SERVICES
+#ifndef ORRERY_SANITIZER_OWNS_MALLOC
 
 #define ORRERY_HOOK extern "C" [[gnu::visibility("default")]]
 

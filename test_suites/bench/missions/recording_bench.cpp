@@ -2,6 +2,7 @@
 // with --orrery_record=off in effect. The two alternate, so that a machine that others use slows
 // both. A recorder has a thread of its own (call_queue.hpp).
 #include <orrery/fixtures/recorder.hpp>
+#include <orrery/harness/kernel/sanitizers.hpp>
 #include <orrery/orrery.hpp>
 
 #include <benchmark/benchmark.h>
@@ -173,7 +174,7 @@ void BM_FilesOfALongRun(benchmark::State& state) {
   state.counters["report_bytes"] = bytes / runs;
 }
 
-#ifdef __SANITIZE_ADDRESS__
+#ifdef ORRERY_ADDRESS_SANITIZER
 constexpr int kHours = 1;
 #else
 constexpr int kHours = 20;
