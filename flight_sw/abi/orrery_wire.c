@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "orrery_crc32.h"
+#include "orrery_crc32_sliced.h"
 
 enum { kOut_bytes = 8192 }; /* frames wait here for DONE, so that a call is answered by one write */
 
@@ -23,6 +23,7 @@ typedef struct wire_state {
   uint32_t slots_bytes, slots_capacity;
   uint32_t storage_bytes; /* what the simulation allows for all slots together */
   orrery_host host;
+  orrery_crc32_tables crc;
   uint32_t out_bytes;
   unsigned char out[kOut_bytes];
 } wire_state;
@@ -68,7 +69,7 @@ static void put_header(wire_state* s, uint32_t type, uint32_t payload_bytes, int
   orrery_put_u32(header + 12, payload_bytes);
   orrery_put_i64(header + 16, time_ns);
   orrery_put_u32(header + 24, (uint32_t)code);
-  orrery_put_u32(header + 28, orrery_crc32(header, 28));
+  orrery_put_u32(header + 28, orrery_crc32_sliced(&s->crc, header, 28));
   put(s, header, sizeof header);
 }
 
@@ -83,12 +84,12 @@ static void put_frame(wire_state* s, uint32_t type, int32_t code, const void* da
   put_header(s, type, bytes, 0, code);
   if (bytes == 0) return;
   put(s, data, bytes);
-  put_crc(s, orrery_crc32((const unsigned char*)data, bytes));
+  put_crc(s, orrery_crc32_sliced(&s->crc, (const unsigned char*)data, bytes));
 }
 
 /* A part of a payload whose length was announced: its CRC goes on. */
 static void put_part(wire_state* s, uint32_t* crc, const void* data, uint32_t bytes) {
-  *crc = orrery_crc32_update(*crc, (const unsigned char*)data, bytes);
+  *crc = orrery_crc32_sliced_update(&s->crc, *crc, (const unsigned char*)data, bytes);
   put(s, data, bytes);
 }
 
@@ -232,12 +233,13 @@ typedef struct wire_request {
   int64_t time_ns;
 } wire_request;
 
-/* 0: not a request that may follow. Its payload lies in s->request then. */
+/* 0: not a request that may follow. Its payload lies in s->request then, and a 0 behind it. */
 static int read_request(wire_state* s, wire_request* r) {
-  unsigned char header[ORRERY_WIRE_HEADER_BYTES], crc[4];
+  unsigned char header[ORRERY_WIRE_HEADER_BYTES];
+  uint32_t crc;
   if (s->link->read(s->link->context, header, sizeof header) < 0) return 0;
   if (orrery_get_u32(header) != ORRERY_WIRE_MAGIC || get_u16(header + 6) != ORRERY_ABI_VERSION ||
-      orrery_get_u32(header + 28) != orrery_crc32(header, 28) ||
+      orrery_get_u32(header + 28) != orrery_crc32_sliced(&s->crc, header, 28) ||
       orrery_get_u32(header + 8) != s->sequence + 1) {
     return 0;
   }
@@ -248,11 +250,10 @@ static int read_request(wire_state* s, wire_request* r) {
   s->sequence++;
   if (r->bytes == 0) return 1;
   if (r->bytes > s->request_capacity) return 0;
-  if (s->link->read(s->link->context, s->request, r->bytes) < 0 ||
-      s->link->read(s->link->context, crc, 4) < 0) {
-    return 0;
-  }
-  return orrery_get_u32(crc) == orrery_crc32(s->request, r->bytes);
+  if (s->link->read(s->link->context, s->request, r->bytes + 4) < 0) return 0;
+  crc = orrery_get_u32(s->request + r->bytes);
+  s->request[r->bytes] = 0;
+  return crc == orrery_crc32_sliced(&s->crc, s->request, r->bytes);
 }
 
 /* One field of CREATE. The texts end with 0 in what the library sees: the byte after them is the
@@ -319,7 +320,7 @@ static void done(wire_state* s, int32_t status, const orrery_wire_cost* cost) {
   put_u64(payload + 40, cost->heap_largest_free);
   put_header(s, ORRERY_W_DONE, sizeof payload, s->pending_tick, status);
   put(s, payload, sizeof payload);
-  put_crc(s, orrery_crc32(payload, sizeof payload));
+  put_crc(s, orrery_crc32_sliced(&s->crc, payload, sizeof payload));
   flush(s);
 }
 
@@ -374,6 +375,7 @@ int32_t orrery_wire_serve(const orrery_wire_link* link, const orrery_flight* fli
   memset(s, 0, sizeof *s);
   s->link = link;
   s->flight = flight;
+  orrery_crc32_fill(&s->crc);
   s->pending_tick = ORRERY_NO_TICK;
   s->storage_bytes = 0xFFFFFFFFu;
   room = work_bytes - skip - state_bytes;
@@ -381,7 +383,7 @@ int32_t orrery_wire_serve(const orrery_wire_link* link, const orrery_flight* fli
   s->request_capacity = (room / 2u) & ~(uint32_t)7u;
   s->slots = s->request + s->request_capacity;
   s->slots_capacity = room - s->request_capacity;
-  s->request_capacity -= 8u; /* the 0 behind a text at the end */
+  s->request_capacity -= 8u; /* the payload's CRC, or the 0 behind a text at the end */
   if (s->request_capacity > ORRERY_WIRE_MOST_BYTES) s->request_capacity = ORRERY_WIRE_MOST_BYTES;
   s->host.size = sizeof s->host;
   s->host.abi_version = ORRERY_ABI_VERSION;

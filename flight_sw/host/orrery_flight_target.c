@@ -26,12 +26,11 @@ static const char kUsage[] =
     "Serves the flight library to a simulation (--orrery_target=SPACECRAFT=...).\n"
     "HOW  --stdio                  standard input and output; the default\n"
     "     --unix PATH              listens on a Unix socket\n"
-    "     --tcp [ADDRESS:]PORT     listens; on 127.0.0.1 unless given; PORT 0 takes a free one\n"
+    "     --tcp [ADDRESS:]PORT     listens, on 127.0.0.1 unless given, and prints PORT; 0: any\n"
     "     --serial DEVICE:BAUD     a serial line, raw, 8N1\n"
     "--once                        ends after the first client\n"
     "--heap BYTES                  a simulated heap for flight code, where it is linked\n"
-    "--instructions PAGE           cost as counted by harness/remote/instruction_count.c\n"
-    "The port that it listens on is printed to standard error.\n";
+    "--instructions PAGE           cost as counted by harness/remote/instruction_count.c\n";
 
 /* harness/heap/target_heap.cpp, where it is linked. */
 __attribute__((weak)) void orrery_target_heap_open(uint32_t bytes);
@@ -43,16 +42,17 @@ static const volatile uint64_t* instructions;
 static uint64_t instructions_of_marks;
 
 typedef struct connection {
-  int in, out;
+  FILE* in; /* buffered: a request takes one read() */
+  int out;
   uint64_t begin_ns;
 } connection;
 
 static int32_t read_all(void* context, void* buffer, uint32_t bytes) {
+  FILE* in = ((connection*)context)->in;
   uint32_t at = 0;
-  while (at < bytes) {
-    const ssize_t n = read(((connection*)context)->in, (char*)buffer + at, bytes - at);
-    if (n == 0 || (n < 0 && errno != EINTR)) return -1;
-    if (n > 0) at += (uint32_t)n;
+  while ((at += (uint32_t)fread((char*)buffer + at, 1, bytes - at, in)) < bytes) {
+    if (feof(in) || errno != EINTR) return -1;
+    clearerr(in);
   }
   return 0;
 }
@@ -107,10 +107,11 @@ static void call_ended(void* context, orrery_wire_cost* cost) {
 /* The library is not closed: a client that goes away leaves one that no destroy has ended. */
 static int serve(const char* path, int in, int out) {
   static uint64_t work[1 << 20];
-  connection c = {.in = in, .out = out};
+  connection c = {.in = fdopen(in, "r"), .out = out};
   const orrery_wire_link link = {&c, read_all, write_all, call_begins, call_ended};
   void* library;
   const orrery_flight* flight = open_flight_library(path, &library);
+  if (c.in == NULL) fail("cannot read what is connected", strerror(errno));
   return orrery_wire_serve(&link, flight, work, sizeof work) == ORRERY_OK ? 0 : 1;
 }
 
@@ -155,7 +156,6 @@ static int serve_in_child(const char* path, int fd, int listener) {
 
 /* Nobody connects to a line: who is there sends ENQ, and more of them, which are dropped. */
 static int serve_serial(const char* path, char* device, int once) {
-  const struct timespec pause = {0, 200000000};
   struct termios line;
   char* baud = strrchr(device, ':');
   unsigned char heard;
@@ -170,11 +170,11 @@ static int serve_serial(const char* path, char* device, int once) {
     fail(device, strerror(errno));
   }
   do {
-    connection c = {.in = fd};
     for (heard = 0; heard != 5;) {
-      if (read_all(&c, &heard, 1) < 0) fail(device, "cannot be read");
+      const ssize_t n = read(fd, &heard, 1);
+      if (n == 0 || (n < 0 && errno != EINTR)) fail(device, "cannot be read");
     }
-    nanosleep(&pause, NULL);
+    usleep(200000);
     tcflush(fd, TCIFLUSH);
     status = serve_in_child(path, fd, -1);
   } while (!once);

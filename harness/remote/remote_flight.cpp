@@ -1,7 +1,7 @@
 #include <orrery/harness/remote/remote_flight.hpp>
 
 #include <cstring>
-#include <orrery_crc32.h>
+#include <orrery_crc32_sliced.h>
 #include <orrery_messages.h>
 #include <orrery_wire.h>
 
@@ -43,6 +43,15 @@ void append_text(ByteBuffer& to, std::uint16_t tag, std::string_view text) {
 void append_number(ByteBuffer& to, std::uint16_t tag, std::uint32_t value) {
   append_field(to, tag, 4);
   append_u32(to, value);
+}
+
+std::uint32_t crc32(const unsigned char* data, std::size_t bytes) {
+  static const orrery_crc32_tables tables = [] {
+    orrery_crc32_tables filled;
+    orrery_crc32_fill(&filled);
+    return filled;
+  }();
+  return orrery_crc32_sliced(&tables, data, bytes);
 }
 
 [[noreturn]] void breach(const std::string& what) {
@@ -99,7 +108,7 @@ RemoteFlight::Frame RemoteFlight::read_header() {
   link_.read(header, sizeof header);
   const unsigned char* h = raw(header);
   if (orrery_get_u32(h) != ORRERY_WIRE_MAGIC) breach("bytes that begin no frame");
-  if (orrery_get_u32(h + 28) != orrery_crc32(h, 28)) breach("a header whose CRC is wrong");
+  if (orrery_get_u32(h + 28) != crc32(h, 28)) breach("a header whose CRC is wrong");
   if (get_u16(h + 6) != ORRERY_ABI_VERSION) {
     breach("frames of ABI version " + std::to_string(get_u16(h + 6)) + "; this program speaks " +
            std::to_string(ORRERY_ABI_VERSION));
@@ -121,7 +130,7 @@ void RemoteFlight::read_payload(const Frame& frame, ByteBuffer& to) {
   link_.read(to.data() + begin, frame.bytes);
   std::byte crc[4];
   link_.read(crc, sizeof crc);
-  if (orrery_get_u32(raw(crc)) != orrery_crc32(raw(to.data() + begin), frame.bytes)) {
+  if (orrery_get_u32(raw(crc)) != crc32(raw(to.data() + begin), frame.bytes)) {
     breach("a payload whose CRC is wrong");
   }
 }
@@ -190,10 +199,10 @@ const TargetAnswer& RemoteFlight::call(std::uint16_t type, std::int64_t now_ns, 
   orrery_put_u32(h + 12, static_cast<std::uint32_t>(payload.size()));
   orrery_put_i64(h + 16, now_ns);
   orrery_put_u32(h + 24, code);
-  orrery_put_u32(h + 28, orrery_crc32(h, 28));
+  orrery_put_u32(h + 28, crc32(h, 28));
   if (!payload.empty()) {
     append(request_, payload.data(), payload.size());
-    append_u32(request_, orrery_crc32(raw(payload.data()), payload.size()));
+    append_u32(request_, crc32(raw(payload.data()), payload.size()));
   }
   naming(address_, [&] { exchange(payload); });
   return answer_;

@@ -2,21 +2,27 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
+#include <condition_variable>
 #include <csignal>
 #include <cstring>
 #include <ctime>
 #include <fcntl.h>
+#include <mutex>
 #include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
 #include <spawn.h>
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <sys/un.h>
 #include <sys/wait.h>
 #include <termios.h>
+#include <thread>
 #include <unistd.h>
+#include <utility>
 
 namespace orrery {
 namespace {
@@ -37,31 +43,35 @@ std::string system_error(int error) {
   throw TargetLost("cannot reach " + to_string(address) + ": " + why);
 }
 
-// The command, with the other end of a socket as its standard input and output.
-int start(const TargetAddress& address, pid_t& child) {
+struct Pipe {
+  int read_end = -1, write_end = -1;
+};
+
+Pipe make_pipe(const TargetAddress& address) {
   int ends[2];
-  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
-    cannot_reach(address, system_error(errno));
-  }
+  if (pipe2(ends, O_CLOEXEC) != 0) cannot_reach(address, system_error(errno));
+  return {.read_end = ends[0], .write_end = ends[1]};
+}
+
+// The command, with the pipes as its standard input and output: they cost half of what a socket
+// does.
+pid_t start(const TargetAddress& address, const Pipe& requests, const Pipe& answers) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, ends[1], STDIN_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, requests.read_end, STDIN_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, answers.write_end, STDOUT_FILENO);
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
   std::string shell = "sh", option = "-c", command = "exec " + address.where;
   std::array<char*, 4> arguments{shell.data(), option.data(), command.data(), nullptr};
+  pid_t child = -1;
   const int error =
       posix_spawn(&child, "/bin/sh", &actions, &attributes, arguments.data(), environ);
   posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
-  close(ends[1]);
-  if (error != 0) {
-    close(ends[0]);
-    cannot_reach(address, system_error(error));
-  }
-  return ends[0];
+  close(answers.write_end);
+  return error == 0 ? child : -error;
 }
 
 // -1, and errno, where nobody listens yet.
@@ -146,16 +156,15 @@ int open_serial(const TargetAddress& address) {
   return fd;
 }
 
-int reach(const TargetAddress& address, Duration patience, pid_t& child) {
+int reach(const TargetAddress& address, Duration patience) {
   switch (address.kind) {
-    case Kind::kExec:
-      return start(address, child);
     case Kind::kUnix:
       return connect_unix(address, patience);
     case Kind::kTcp:
       return connect_tcp(address, patience);
     case Kind::kSerial:
       return open_serial(address);
+    case Kind::kExec:
     case Kind::kEmulator:
     case Kind::kHere:
       break;
@@ -165,37 +174,134 @@ int reach(const TargetAddress& address, Duration patience, pid_t& child) {
 
 }  // namespace
 
+// A read() of a pipe has no time-out. This one writes a byte where it blocks for too long.
+class TargetLink::Watch {
+ public:
+  /// Null where a pipe cannot be opened again (no /proc).
+  static std::unique_ptr<Watch> over(int pipe, Duration patience) {
+    const std::string path = "/proc/self/fd/" + std::to_string(pipe);
+    const int fd = open_to_write(path);
+    if (fd < 0) return nullptr;
+    close(fd);
+    return std::make_unique<Watch>(path, patience);
+  }
+  Watch(const std::string& path, Duration patience) : patience_(patience) {
+    sigset_t all, before;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);  // signals are for other threads
+    thread_ = std::thread([this, path] { run(path); });
+    pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  }
+  ~Watch() {
+    if (getpid() != process_) {  // a fork has no other threads
+      thread_.detach();
+      return;
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      ending_ = true;
+    }
+    wake_.notify_one();
+    thread_.join();
+  }
+  Watch(const Watch&) = delete;
+  Watch& operator=(const Watch&) = delete;
+
+  /// Of the read() that follows; 0: there is none.
+  void set_deadline(std::int64_t host_ns) { deadline_ns_ = host_ns; }
+  bool has_expired() const { return expired_; }
+
+ private:
+  static int open_to_write(const std::string& path) {
+    return open(path.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
+  }
+  void run(const std::string& path) {
+    std::unique_lock lock(mutex_);
+    while (!ending_) {
+      const std::int64_t now_ns = host_now_ns(), deadline_ns = deadline_ns_;
+      if (deadline_ns != 0 && deadline_ns <= now_ns) {
+        expired_ = true;
+        const int fd = open_to_write(path);
+        if (fd >= 0 && ::write(fd, "", 1) <= 0) errno = 0;  // full: no read() blocks
+        if (fd >= 0) close(fd);
+        return;
+      }
+      const std::int64_t left_ns = deadline_ns != 0 ? deadline_ns - now_ns : patience_.count();
+      wake_.wait_for(lock, std::chrono::nanoseconds(left_ns));
+    }
+  }
+
+  Duration patience_;
+  pid_t process_ = getpid();
+  std::atomic<std::int64_t> deadline_ns_{0};
+  std::atomic<bool> expired_{false};
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  bool ending_ = false;
+  std::thread thread_;
+};
+
 TargetLink::TargetLink(const TargetAddress& address, Duration patience) : TargetLink(-1, patience) {
-  fd_ = reach(address, patience, child_);
-  fcntl(fd_, F_SETFL, fcntl(fd_, F_GETFL) | O_NONBLOCK);
+  if (address.kind != Kind::kExec) {
+    listen_to(reach(address, patience));
+    return;
+  }
+  const Pipe requests = make_pipe(address);
+  out_ = requests.write_end;
+  other_end_ = requests.read_end;
+  const Pipe answers = make_pipe(address);
+  in_ = answers.read_end;
+  fcntl(out_, F_SETFL, fcntl(out_, F_GETFL) | O_NONBLOCK);
+  const pid_t child = start(address, requests, answers);
+  if (child < 0) cannot_reach(address, system_error(-child));
+  child_ = child;
+  watch_ = Watch::over(in_, patience);
+  if (watch_ == nullptr) fcntl(in_, F_SETFL, fcntl(in_, F_GETFL) | O_NONBLOCK);
+  core_ = SharedCore::of_this_thread();
+  core_->join(child_);
   begin_exchange();
 }
 
-TargetLink::TargetLink(int socket, Duration patience)
-    : patience_(patience), fd_(socket), buffer_(64 * 1024) {
+TargetLink::TargetLink(int socket, Duration patience) : patience_(patience), buffer_(64 * 1024) {
   if (patience <= Duration{0}) {
     throw std::invalid_argument("TargetLink: patience = " + to_string(patience) +
                                 "; it is above 0");
   }
-  if (socket < 0) return;
-  fcntl(fd_, F_SETFL, fcntl(fd_, F_GETFL) | O_NONBLOCK);
+  if (socket >= 0) listen_to(socket);
+}
+
+void TargetLink::listen_to(int fd) {
+  in_ = out_ = fd;
+  const timeval timeout{.tv_sec = patience_.count() / 1'000'000'000,
+                        .tv_usec = patience_.count() % 1'000'000'000 / 1000 + 1};
+  is_socket_ = setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout) == 0;
+  if (!is_socket_) fcntl(fd, F_SETFL, fcntl(fd, F_GETFL) | O_NONBLOCK);
   begin_exchange();
 }
 
 TargetLink::~TargetLink() {
-  if (fd_ >= 0) close(fd_);
+  if (core_ != nullptr && child_ >= 0) core_->leave(child_);
+  watch_.reset();
+  for (const int fd : {in_, other_end_}) {
+    if (fd >= 0) close(fd);
+  }
+  if (out_ >= 0 && out_ != in_) close(out_);
   if (child_ < 0) return;
   kill(-child_, SIGKILL);
   while (waitpid(child_, nullptr, 0) < 0 && errno == EINTR) continue;
 }
 
 void TargetLink::begin_exchange() {
-  deadline_ns_ = host_now_ns() + patience_.count();
+  const std::int64_t now_ns = host_now_ns();
+  deadline_ns_ = now_ns + patience_.count();
+  may_block_ = true;
+  if (core_ != nullptr) core_->take_turn(now_ns);
 }
 
 // The other end is closed: of a child, how.
 std::string TargetLink::how_it_ended() {
   if (child_ < 0) return "closed the link";
+  core_->leave(child_);
   int status = 0;
   // It closes its end a moment before it can be waited for.
   for (int i = 0; i < 100; ++i) {
@@ -214,13 +320,20 @@ std::string TargetLink::how_it_ended() {
   return "closed the link";
 }
 
+void TargetLink::give_up() const {
+  throw TargetLost("did not answer within " + to_string(patience_) + " of host time");
+}
+
 void TargetLink::wait_for(short events) {
+  may_block_ = false;
   for (;;) {
     const std::int64_t left_ns = deadline_ns_ - host_now_ns();
-    if (left_ns <= 0)
-      throw TargetLost("did not answer within " + to_string(patience_) + " of host time");
-    pollfd wanted{.fd = fd_, .events = events, .revents = 0};
-    const int ready = poll(&wanted, 1, static_cast<int>(left_ns / 1'000'000) + 1);
+    if (left_ns <= 0) give_up();
+    // Who reads no more shows by having closed what it writes to.
+    pollfd wanted[] = {{.fd = events == POLLIN ? in_ : out_, .events = events, .revents = 0},
+                       {.fd = in_, .events = 0, .revents = 0}};
+    const int ready = poll(wanted, 2, static_cast<int>(left_ns / 1'000'000) + 1);
+    if (ready > 0 && wanted[0].revents == 0) throw TargetLost(how_it_ended());
     if (ready > 0) return;
     if (ready < 0 && errno != EINTR)
       throw TargetLost("cannot be waited for: " + system_error(errno));
@@ -229,9 +342,10 @@ void TargetLink::wait_for(short events) {
 
 void TargetLink::write(Bytes data) {
   while (!data.empty()) {
-    // Without a signal where the other end is gone; a serial line takes no send().
-    ssize_t sent = send(fd_, data.data(), data.size(), MSG_NOSIGNAL);
-    if (sent < 0 && errno == ENOTSOCK) sent = ::write(fd_, data.data(), data.size());
+    // Without a signal where the other end is gone, which pipe and serial line never are.
+    const ssize_t sent = is_socket_
+                             ? send(out_, data.data(), data.size(), MSG_NOSIGNAL | MSG_DONTWAIT)
+                             : ::write(out_, data.data(), data.size());
     if (sent > 0) {
       data = data.subspan(static_cast<std::size_t>(sent));
     } else if (sent < 0 && errno == EAGAIN) {
@@ -242,9 +356,22 @@ void TargetLink::write(Bytes data) {
   }
 }
 
+// What there is, 1 byte at least.
 std::size_t TargetLink::receive(std::byte* to, std::size_t bytes) {
   for (;;) {
-    const ssize_t got = ::read(fd_, to, bytes);
+    ssize_t got = 0;
+    if (watch_ != nullptr) {
+      if (watch_->has_expired()) give_up();
+      watch_->set_deadline(deadline_ns_);
+      got = ::read(in_, to, bytes);
+      watch_->set_deadline(0);
+      if (watch_->has_expired()) give_up();
+    } else if (is_socket_) {
+      // The socket's time-out is that of a whole exchange, so the first wait alone may take it.
+      got = recv(in_, to, bytes, std::exchange(may_block_, false) ? 0 : MSG_DONTWAIT);
+    } else {
+      got = ::read(in_, to, bytes);
+    }
     if (got > 0) return static_cast<std::size_t>(got);
     if (got == 0 || (errno != EAGAIN && errno != EINTR)) throw TargetLost(how_it_ended());
     if (errno == EAGAIN) wait_for(POLLIN);

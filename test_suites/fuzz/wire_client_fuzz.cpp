@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstring>
-#include <orrery_crc32.h>
+#include <orrery_crc32_sliced.h>
 #include <orrery_messages.h>
 #include <orrery_wire.h>
 #include <sys/socket.h>
@@ -22,6 +22,15 @@ namespace orrery {
 namespace {
 
 using Buffer = std::vector<unsigned char>;
+
+std::uint32_t crc32(const unsigned char* data, std::size_t bytes) {
+  static const orrery_crc32_tables tables = [] {
+    orrery_crc32_tables filled;
+    orrery_crc32_fill(&filled);
+    return filled;
+  }();
+  return orrery_crc32_sliced(&tables, data, bytes);
+}
 
 void append_u32(Buffer& to, std::uint32_t value) {
   unsigned char bytes[4];
@@ -39,10 +48,10 @@ void append_frame(Buffer& to, unsigned type, std::uint32_t sequence, std::uint32
   append_u32(to, damage);
   append_u32(to, damage == 4 ? 0xFFFFFFFFu : 0);
   append_u32(to, code);
-  append_u32(to, orrery_crc32(to.data() + begin, 28) + (damage == 5 ? 1 : 0));
+  append_u32(to, crc32(to.data() + begin, 28) + (damage == 5 ? 1 : 0));
   if (bytes == 0) return;
   to.insert(to.end(), payload, payload + bytes);
-  append_u32(to, orrery_crc32(payload, bytes) + (damage == 6 ? 1 : 0));
+  append_u32(to, crc32(payload, bytes) + (damage == 6 ? 1 : 0));
 }
 
 // 4096 bytes, "f", "1", one output port 2 of 100 bytes.

@@ -1,0 +1,65 @@
+#include <orrery/harness/remote/shared_core.hpp>
+
+#include <algorithm>
+#include <unistd.h>
+
+namespace orrery {
+
+std::shared_ptr<SharedCore> SharedCore::of_this_thread() {
+  thread_local const auto shared = std::make_shared<SharedCore>();
+  return shared;
+}
+
+SharedCore::SharedCore() : tid_(gettid()) {}
+
+void SharedCore::join(pid_t child) {
+  const std::lock_guard lock(mutex_);
+  if (children_.empty()) {
+    if (sched_getaffinity(0, sizeof home_, &home_) != 0 || CPU_COUNT(&home_) < 2) return;
+    stay();
+    next_ns_ = 0;
+  }
+  children_.push_back(child);
+  sched_setaffinity(child, sizeof core_, &core_);
+}
+
+void SharedCore::leave(pid_t child) {
+  const std::lock_guard lock(mutex_);
+  if (std::erase(children_, child) > 0 && children_.empty()) let_go();
+}
+
+void SharedCore::choose(std::int64_t host_now_ns) {
+  constexpr std::int64_t kPeriod_ns = 50'000'000;
+  const std::lock_guard lock(mutex_);
+  std::erase_if(children_, [this](pid_t child) {
+    cpu_set_t now;
+    return sched_getaffinity(child, sizeof now, &now) != 0 || !CPU_EQUAL(&now, &core_);
+  });
+  if (children_.empty()) {
+    let_go();
+    return;
+  }
+  if (!loose_) {
+    sched_setaffinity(0, sizeof home_, &home_);
+    loose_ = true;
+    return;
+  }
+  loose_ = false;
+  stay();
+  for (const pid_t child : children_) sched_setaffinity(child, sizeof core_, &core_);
+  next_ns_ = host_now_ns + kPeriod_ns;
+}
+
+void SharedCore::stay() {
+  CPU_ZERO(&core_);
+  CPU_SET(std::max(0, sched_getcpu()), &core_);
+  sched_setaffinity(0, sizeof core_, &core_);
+}
+
+void SharedCore::let_go() {
+  sched_setaffinity(tid_, sizeof home_, &home_);
+  loose_ = false;
+  next_ns_ = INT64_MAX;
+}
+
+}  // namespace orrery

@@ -1,0 +1,55 @@
+/// One core for two processes that take turns.
+#pragma once
+
+#include <orrery/harness/kernel/simulator_only.hpp>
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <sched.h>
+#include <sys/types.h>
+#include <thread>
+#include <vector>
+
+namespace orrery {
+
+/// Keeps a thread and the child processes that it calls on one core, since a wake-up across cores
+/// costs several times a switch within one. Which core is the system's choice, made anew every
+/// 50 ms of host time: for one exchange the thread may run wherever it might before, and then they
+/// all stay where it is. Concerns speed only.
+///
+/// A child that sets its affinity itself is left alone from then on. Where the thread has but one
+/// core nothing is done. A thread that is started meanwhile inherits the one core.
+class SharedCore {
+ public:
+  /// Of the calling thread; one for all that it calls.
+  static std::shared_ptr<SharedCore> of_this_thread();
+  SharedCore();
+  SharedCore(const SharedCore&) = delete;
+  SharedCore& operator=(const SharedCore&) = delete;
+
+  /// Started a moment ago by this thread.
+  void join(pid_t child);
+  /// Before it is waited for. The last one gives the thread its cores back. Any thread.
+  void leave(pid_t child);
+  /// Before each exchange. In another thread it does nothing.
+  void take_turn(std::int64_t host_now_ns) {
+    if (host_now_ns >= next_ns_ && std::this_thread::get_id() == thread_) choose(host_now_ns);
+  }
+
+ private:
+  void choose(std::int64_t host_now_ns);
+  void stay();
+  void let_go();
+
+  std::thread::id thread_ = std::this_thread::get_id();
+  pid_t tid_;
+  std::mutex mutex_;
+  std::vector<pid_t> children_;
+  cpu_set_t home_{};  // of the thread, before
+  cpu_set_t core_{};  // where they are
+  bool loose_ = false;
+  std::int64_t next_ns_ = INT64_MAX;
+};
+
+}  // namespace orrery
