@@ -19,6 +19,10 @@ using namespace orrery::visors;
 
 namespace {
 
+// Longer than the 30 s that flight software has otherwise: on cores that others use, too, one
+// resolution of ambiguities in soft float has taken more.
+constexpr Duration kPatience = 10min;
+
 /// The targets of both spacecraft: {"qemu-arm", ""}.
 struct Targets {
   const char *chief = "", *deputy = "";
@@ -47,6 +51,7 @@ Flown first_flight(const Targets& targets, Duration span) {
   FormationOptions options{.flight = {.library = "formation_keeping", .heap_bytes = 256_kB},
                            .chief_target = targets.chief,
                            .deputy_target = targets.deputy};
+  options.flight.target_patience = kPatience;
   options.world.record = false;
   FormationWorld world(missions::first_flight(options));
   const RelativeElements target_m = missions::safe_ellipse_m(100);
@@ -65,6 +70,7 @@ Flown telescope(const Targets& targets, Duration span) {
   FormationOptions options = in_science_orbit({.seed = 1});
   options.world.record = false;
   options.flight.config = "initial_mode=science\n";
+  options.flight.target_patience = kPatience;
   options.chief_target = targets.chief;
   options.deputy_target = targets.deputy;
   VisorsWorld world(options);
