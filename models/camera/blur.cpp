@@ -23,9 +23,28 @@ std::vector<float> kernel(double sigma) {
   return normalised;
 }
 
-// One tap at a time over a whole row: simple loops, that compilers make wide.
-void add_row(float* out, const float* in, int count, float part) {
-  for (int u = 0; u < count; ++u) out[u] += part * in[u];
+struct Tap {
+  const float* in = nullptr;
+  float part = 0;
+};
+
+// out = the sum of part * in over the taps, in blocks that stay in registers.
+void weighted_sum(float* out, const std::vector<Tap>& taps, int count) {
+  constexpr int kBlock = 16;
+  int u = 0;
+  for (; u + kBlock <= count; u += kBlock) {
+    float sums[kBlock] = {};
+    for (const Tap& tap : taps) {
+      const float* in = tap.in + u;
+      for (int i = 0; i < kBlock; ++i) sums[i] += tap.part * in[i];
+    }
+    std::copy_n(sums, kBlock, out + u);
+  }
+  for (; u < count; ++u) {
+    float sum = 0;
+    for (const Tap& tap : taps) sum += tap.part * tap.in[u];
+    out[u] = sum;
+  }
 }
 
 }  // namespace
@@ -34,24 +53,35 @@ void blur(Image<float>& image, double sigma_px, int threads) {
   const std::vector<float> parts = kernel(sigma_px);
   const int half = static_cast<int>(parts.size()) / 2, width = image.width_px;
   Image<float> across(image.width_px, image.height_px);
+  std::vector<char> is_dark(static_cast<std::size_t>(image.height_px));  // rows, which add nothing
   for_bands_of_rows(threads, image.height_px, [&](int first, int end) {
     std::vector<float> padded(static_cast<std::size_t>(width + 2 * half));
+    std::vector<Tap> taps;
+    for (int k = 0; k <= 2 * half; ++k) {
+      taps.push_back({padded.data() + k, parts[static_cast<std::size_t>(k)]});
+    }
     for (int v = first; v < end; ++v) {
-      std::fill_n(padded.begin(), half, image.at(0, v));
-      std::copy_n(image.row(v), width, padded.begin() + half);
-      std::fill_n(padded.end() - half, half, image.at(width - 1, v));
-      for (int k = 0; k <= 2 * half; ++k) {
-        add_row(across.row(v), padded.data() + k, width, parts[static_cast<std::size_t>(k)]);
+      const float* row = image.row(v);
+      if (std::all_of(row, row + width, [](float value) { return value == 0; })) {
+        is_dark[static_cast<std::size_t>(v)] = 1;
+        continue;
       }
+      std::fill_n(padded.begin(), half, row[0]);
+      std::copy_n(row, width, padded.begin() + half);
+      std::fill_n(padded.end() - half, half, row[width - 1]);
+      weighted_sum(across.row(v), taps, width);
     }
   });
   for_bands_of_rows(threads, image.height_px, [&](int first, int end) {
+    std::vector<Tap> taps;
     for (int v = first; v < end; ++v) {
-      std::fill_n(image.row(v), width, 0.0f);
+      taps.clear();
       for (int k = -half; k <= half; ++k) {
         const int from = std::clamp(v + k, 0, image.height_px - 1);
-        add_row(image.row(v), across.row(from), width, parts[static_cast<std::size_t>(k + half)]);
+        if (is_dark[static_cast<std::size_t>(from)]) continue;
+        taps.push_back({across.row(from), parts[static_cast<std::size_t>(k + half)]});
       }
+      weighted_sum(image.row(v), taps, width);
     }
   });
 }

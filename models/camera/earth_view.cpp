@@ -17,6 +17,7 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kAtmosphereScales = 10;
 constexpr double kWater = 0.06, kLand = 0.10;  // albedo
 constexpr double kGlintReflectance = 0.02, kGlintExponent = 30;
+constexpr int kTogether = 64;  // pixels
 
 void check(const char* option, double value, double low, double high) {
   if (!(value >= low && value <= high)) {
@@ -35,7 +36,9 @@ class EarthRays {
         R_EC_(pose.R_EI * transpose(pose.R_CI)),
         beta_C_(pose.R_CI * pose.v_ECI / kSpeedOfLight_mps),
         to_sun_(pose.R_EI * pose.to_sun_ECI),
-        sun_(pose.sun) {
+        sun_(pose.sun),
+        top_(options.atmosphere ? kAtmosphereScales * options.scale_height_m / options.radius_m
+                                : 0) {
     const Vec3 r = pose.R_EI * pose.r_ECI / unit_m_;
     p_ = {r.x, r.y, r.z * stretch_};
     c_ = dot(p_, p_) - 1;
@@ -76,9 +79,88 @@ class EarthRays {
   struct Seen {
     double covered = 0, radiance = 0;
   };
+  // Up to kTogether pixels of one row, added to `suns` and `covered`. What is not on the edge of
+  // the solid Earth is computed side by side, and where neither it nor the atmosphere is, not at
+  // all.
+  void look(const PixelRay* rays, int count, float weight, float* suns, float* covered) const {
+    Together t;
+    if (!cross(rays, count, t)) return;
+    find_normals(count, t);
+    for (int i = 0; i < count; ++i) {
+      if (!t.is_seen[i]) continue;
+      const double solid_angle = rays[i].solid_angle_sr;
+      Seen seen;
+      if (t.is_edge[i]) {
+        seen = look({{t.dx[i], t.dy[i], t.dz[i]},
+                     {t.dx[i], t.dy[i], t.dz[i] * stretch_},
+                     t.a[i],
+                     t.b[i],
+                     t.height[i]},
+                    std::sqrt(solid_angle));
+      } else if (t.height[i] < 0) {
+        seen = {1, radiance({t.dx[i], t.dy[i], t.dz[i]}, {t.nx[i], t.ny[i], t.nz[i]}, t.cosine[i])};
+      } else {
+        seen.radiance = glow(t.height[i] * unit_m_, t.cosine[i]);
+      }
+      suns[i] += weight * static_cast<float>(seen.radiance * solid_angle);
+      covered[i] += weight * static_cast<float>(seen.covered);
+    }
+  }
+
+ private:
+  struct Together {
+    double dx[kTogether], dy[kTogether], dz[kTogether];  // as Crossing has them
+    double a[kTogether], b[kTogether], height[kTogether];
+    bool is_seen[kTogether], is_edge[kTogether];
+    // Where the ray meets the surface, or else at the tangent point; cosine of the Sun's angle.
+    double nx[kTogether], ny[kTogether], nz[kTogether], cosine[kTogether];
+  };
+
+  // False: nothing of the Earth is seen.
+  bool cross(const PixelRay* rays, int count, Together& t) const {
+    const Mat3& R = R_EC_;
+    for (int i = 0; i < count; ++i) {
+      const double x = rays[i].x, y = rays[i].y, z = rays[i].z;
+      const double along = x * beta_C_.x + y * beta_C_.y + z * beta_C_.z;
+      const double u = x - beta_C_.x + along * x, v = y - beta_C_.y + along * y,
+                   w = z - beta_C_.z + along * z;
+      const double dx = R.row_x.x * u + R.row_x.y * v + R.row_x.z * w;
+      const double dy = R.row_y.x * u + R.row_y.y * v + R.row_y.z * w;
+      const double dz = R.row_z.x * u + R.row_z.y * v + R.row_z.z * w;
+      const double qz = dz * stretch_;
+      const double a = dx * dx + dy * dy + qz * qz;
+      const double b = dx * p_.x + dy * p_.y + qz * p_.z;
+      t.dx[i] = dx, t.dy[i] = dy, t.dz[i] = dz;
+      t.a[i] = a, t.b[i] = b;
+      t.height[i] = 0.5 * (c_ - b * b / a);
+    }
+    int seen = 0;
+    for (int i = 0; i < count; ++i) {
+      // Half a pixel at the tangent point, squared, against the height: as look() has it.
+      const double a = t.a[i], b = t.b[i], h = t.height[i];
+      t.is_edge[i] = h * h * a * a < 0.25 * b * b * double(rays[i].solid_angle_sr);
+      t.is_seen[i] = b < 0 && (h < top_ || t.is_edge[i]);
+      seen += t.is_seen[i];
+    }
+    return seen > 0;
+  }
+
+  void find_normals(int count, Together& t) const {
+    for (int i = 0; i < count; ++i) {
+      const double a = t.a[i], b = t.b[i];
+      const double root2 = b * b - a * c_;
+      const double way = (-b - std::sqrt(root2 > 0 ? root2 : 0)) / a;
+      const double x = p_.x + way * t.dx[i], y = p_.y + way * t.dy[i];
+      const double z = (p_.z + way * (t.dz[i] * stretch_)) * stretch_;
+      const double scale = 1 / std::sqrt(x * x + y * y + z * z);
+      t.nx[i] = x * scale, t.ny[i] = y * scale, t.nz[i] = z * scale;
+      t.cosine[i] = t.nx[i] * to_sun_.x + t.ny[i] * to_sun_.y + t.nz[i] * to_sun_.z;
+    }
+  }
+
+  // Of a pixel at the edge.
   Seen look(const Crossing& x, double pixel_rad) const {
     Seen seen;
-    if (x.b >= 0) return seen;
     const double range = -x.b / x.a;  // to the tangent point
     const double off_limb_px = x.height / (range * pixel_rad);
     seen.covered = std::clamp(0.5 - off_limb_px, 0.0, 1.0);
@@ -89,30 +171,33 @@ class EarthRays {
     return seen;
   }
 
- private:
   double surface(const Crossing& x) const {
     const double root = std::sqrt(std::max(0.0, x.b * x.b - x.a * c_));
     const double t = (-x.b - root) / x.a;
     const Vec3 s = p_ + t * x.q;  // on the unit sphere
     const Vec3 normal = unit({s.x, s.y, s.z * stretch_});
-    const EarthSurface::Sample map = options_.surface.at(normal);
-    const double cosine = dot(normal, to_sun_);
-    if (cosine <= 0) return sun_ / kPi * double(map.night);
-    double radiance = sun_ / kPi * double(map.albedo) * cosine;
-    const double water = std::clamp((kLand - double(map.albedo)) / (kLand - kWater), 0.0, 1.0);
-    if (options_.glint && water > 0) radiance += water * glint(x, normal, cosine);
-    return radiance;
+    return radiance(x.d_E, normal, dot(normal, to_sun_));
   }
-  double glint(const Crossing& x, const Vec3& normal, double cosine) const {
-    const double half = std::max(0.0, dot(normal, unit(to_sun_ - x.d_E)));
+  // Of the surface.
+  double radiance(const Vec3& d_E, const Vec3& normal, double cosine) const {
+    const EarthSurface::Sample map = options_.surface.at(normal);
+    if (cosine <= 0) return sun_ / kPi * double(map.night);
+    const double diffuse = sun_ / kPi * double(map.albedo) * cosine;
+    if (!options_.glint) return diffuse;
+    const double water = std::clamp((kLand - double(map.albedo)) / (kLand - kWater), 0.0, 1.0);
+    return water > 0 ? diffuse + water * glint(d_E, normal, cosine) : diffuse;
+  }
+  double glint(const Vec3& d_E, const Vec3& normal, double cosine) const {
+    const double half = std::max(0.0, dot(normal, unit(to_sun_ - d_E)));
     return sun_ * cosine * kGlintReflectance * (kGlintExponent + 8) / (8 * kPi) *
            std::pow(half, kGlintExponent);
   }
   double limb(const Crossing& x, double range) const {
-    const double height_m = std::max(0.0, x.height) * unit_m_;
-    if (height_m > kAtmosphereScales * options_.scale_height_m) return 0;
     const Vec3 s = p_ + range * x.q;
-    const double cosine = dot(unit({s.x, s.y, s.z * stretch_}), to_sun_);
+    return glow(std::max(0.0, x.height) * unit_m_, dot(unit({s.x, s.y, s.z * stretch_}), to_sun_));
+  }
+  double glow(double height_m, double cosine) const {
+    if (!options_.atmosphere || height_m > kAtmosphereScales * options_.scale_height_m) return 0;
     return sun_ / kPi * options_.limb_reflectance * std::max(0.0, cosine) *
            std::exp(-height_m / options_.scale_height_m);
   }
@@ -121,7 +206,7 @@ class EarthRays {
   double unit_m_, stretch_;
   Mat3 R_EC_;
   Vec3 beta_C_, to_sun_, p_;
-  double sun_, c_ = 0;
+  double sun_, top_, c_ = 0;  // top of the atmosphere, over the radius
 };
 
 }  // namespace
@@ -158,13 +243,10 @@ void EarthView::add(Image<float>& suns, Image<float>& covered, const Image<Pixel
     return;
   }
   for_bands_of_rows(threads, rays.height_px, [&](int first, int end) {
-    for (std::size_t k = rays.index(0, first); k < rays.index(0, end); ++k) {
-      const PixelRay& ray = rays.values[k];
-      const double solid_angle = ray.solid_angle_sr;
-      const EarthRays::Seen seen =
-          earth.look(earth.cross({ray.x, ray.y, ray.z}), std::sqrt(solid_angle));
-      suns.values[k] += weight * static_cast<float>(seen.radiance * solid_angle);
-      covered.values[k] += weight * static_cast<float>(seen.covered);
+    for (std::size_t k = rays.index(0, first); k < rays.index(0, end); k += kTogether) {
+      const std::size_t count = std::min<std::size_t>(kTogether, rays.index(0, end) - k);
+      earth.look(&rays.values[k], static_cast<int>(count), weight, &suns.values[k],
+                 &covered.values[k]);
     }
   });
 }

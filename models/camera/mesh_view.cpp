@@ -65,35 +65,64 @@ std::array<double, 3> weights_at(const Corners& c, double u, double v) {
   return {1 - a - b, b, a};
 }
 
+// What is linear over a triangle in the plane of the grid, given at its corners.
+struct Linear {
+  double at_0 = 0, per_u = 0, per_v = 0;
+
+  Linear() = default;
+  Linear(const Corners& c, double value_0, double value_1, double value_2)
+      : at_0(value_0),
+        per_u(((value_1 - value_0) * (c[2].v - c[0].v) - (value_2 - value_0) * (c[1].v - c[0].v)) /
+              doubled_area(c)),
+        per_v(((value_2 - value_0) * (c[1].u - c[0].u) - (value_1 - value_0) * (c[2].u - c[0].u)) /
+              doubled_area(c)) {}
+  /// From the first corner.
+  double at(double du, double dv) const { return at_0 + per_u * du + per_v * dv; }
+};
+
+// Of a triangle, the upper end first, so that both triangles that share it cross the same points.
+struct Edge {
+  double u = 0, v = 0, end_v = 0, slope = 0;
+
+  Edge(Corner p, Corner q) {
+    if (p.v > q.v) std::swap(p, q);
+    u = p.u, v = p.v, end_v = q.v;
+    slope = p.v < q.v ? (q.u - p.u) / (q.v - p.v) : 0;
+  }
+};
+
+// Of a number from 0 to 1e9; the library's are calls where the processor need not have them.
+int rounded_up(double x) {
+  const int below = static_cast<int>(x);
+  return below < x ? below + 1 : below;
+}
+
 // Samples are at (column + 1/2, row + 1/2). One that lies on an edge belongs to the later triangle,
 // which is the same for any band of rows.
 void scan(DepthGrid& grid, const Corners& c, int id, int first_row, int end_row) {
   const auto [low_v, high_v] = std::minmax({c[0].v, c[1].v, c[2].v});
-  const double whole = doubled_area(c);
-  if (!(std::abs(whole) > 1e-12)) return;
-  const int begin = std::max(first_row, static_cast<int>(std::ceil(std::max(low_v - 0.5, -1.0))));
-  const int end = std::min(end_row, static_cast<int>(std::floor(std::min(high_v - 0.5, 1e6))) + 1);
+  if (high_v < first_row || low_v > end_row) return;
+  if (!(std::abs(doubled_area(c)) > 1e-12)) return;
+  const int begin = std::max(first_row, rounded_up(std::clamp(low_v - 0.5, 0.0, 1e6)));
+  const int end = std::min(end_row, static_cast<int>(std::clamp(high_v + 0.5, 0.0, 1e6)));
+  if (begin >= end) return;
+  const Linear nearness(c, c[0].nearness, c[1].nearness, c[2].nearness);
+  const Edge edges[3] = {{c[0], c[1]}, {c[1], c[2]}, {c[2], c[0]}};
   for (int row = begin; row < end; ++row) {
     const double v = row + 0.5;
     double left = 1e9, right = -1e9;
-    for (int k = 0; k < 3; ++k) {
-      const Corner &p = c[static_cast<std::size_t>(k)],
-                   &q = c[static_cast<std::size_t>((k + 1) % 3)];
-      if ((p.v <= v) == (q.v <= v)) continue;
-      const double u = p.u + (q.u - p.u) * (v - p.v) / (q.v - p.v);
+    for (const Edge& edge : edges) {
+      if (edge.v > v || edge.end_v <= v) continue;
+      const double u = edge.u + edge.slope * (v - edge.v);
       left = std::min(left, u), right = std::max(right, u);
     }
-    if (left > right) continue;
-    const int from = static_cast<int>(std::ceil(std::max(left - 0.5, 0.0)));
-    const int to = static_cast<int>(std::floor(std::min(right - 0.5, grid.columns - 1.0)));
+    if (left > right || right < 0.5) continue;
+    const int from = rounded_up(std::clamp(left - 0.5, 0.0, 1e6));
+    const int to = static_cast<int>(std::min(right - 0.5, grid.columns - 1.0));
     if (from > to) continue;
-    const auto w = weights_at(c, from + 0.5, v);
-    double near = w[0] * c[0].nearness + w[1] * c[1].nearness + w[2] * c[2].nearness;
-    const double slope = ((c[1].nearness - c[0].nearness) * (c[2].v - c[0].v) -
-                          (c[2].nearness - c[0].nearness) * (c[1].v - c[0].v)) /
-                         whole;
+    double near = nearness.at(from + 0.5 - c[0].u, v - c[0].v);
     std::size_t at = grid.index(from, row);
-    for (int column = from; column <= to; ++column, ++at, near += slope) {
+    for (int column = from; column <= to; ++column, ++at, near += nearness.per_u) {
       if (near >= grid.nearness[at]) grid.nearness[at] = near, grid.triangle[at] = id;
     }
   }
@@ -126,23 +155,21 @@ class ShadowMap {
     });
   }
 
-  bool is_lit(const Vec3& p_B, int triangle, double cosine) const {
-    const Corner c = place(p_B);
-    const int column = std::clamp(static_cast<int>(c.u), 0, grid_.columns - 1);
-    const int row = std::clamp(static_cast<int>(c.v), 0, grid_.rows - 1);
+  bool is_lit(const Corner& c, int triangle, double slack) const {
+    const int column = c.u > 0 ? static_cast<int>(std::min(c.u, grid_.columns - 1.0)) : 0;
+    const int row = c.v > 0 ? static_cast<int>(std::min(c.v, grid_.rows - 1.0)) : 0;
     const std::size_t at = grid_.index(column, row);
     if (grid_.triangle[at] < 0 || grid_.triangle[at] == triangle) return true;
-    // One texel of the map along the surface, whose depth it cannot resolve.
-    const double slack = (1.5 / scale_) * (1 + 1 / std::max(cosine, 0.05));
     return grid_.nearness[at] - c.nearness < slack;
   }
-
- private:
+  // One texel of the map along the surface, whose depth it cannot resolve.
+  double slack(double cosine) const { return (1.5 / scale_) * (1 + 1 / std::max(cosine, 0.05)); }
   Corner place(const Vec3& p) const {
     return {(dot(p, axes_.x) + radius_) * scale_, (dot(p, axes_.y) + radius_) * scale_,
             dot(p, axes_.z)};
   }
 
+ private:
   double radius_;
   SunAxes axes_;
   DepthGrid grid_;
@@ -197,6 +224,7 @@ class MeshSampler {
     DepthGrid grid(out.columns, out.rows);
     for_bands_of_rows(threads, out.rows, [&](int first, int end) { scan_all(grid, first, end); });
     const ShadowMap shadows(mesh_, shading_.to_sun_B(), shadow_map_size(), threads);
+    place_facets(shadows);
     out.suns.assign(grid.triangle.size(), 0);
     out.covered.assign(grid.triangle.size(), 0);
     for_bands_of_rows(threads, out.rows,
@@ -213,9 +241,9 @@ class MeshSampler {
     camera_B_ = -(pose_.R_TI * pose_.r_TC_ECI);
     for (const Vec3& vertex : mesh_.vertices_B()) {
       const Vec3 p_C = R_CT * vertex + centre_C_;
-      const bool is_seen = p_C.z > kNearest_m;
-      const Pixel at = is_seen ? *camera_.project(p_C) : Pixel{};
-      corners_.push_back({at.u, at.v, is_seen ? 1 / p_C.z : 0});
+      const bool is_in_front = p_C.z > kNearest_m;
+      const Pixel at = is_in_front ? *camera_.project(p_C) : Pixel{};
+      corners_.push_back({at.u, at.v, is_in_front ? 1 / p_C.z : 0});
     }
     return true;
   }
@@ -255,9 +283,7 @@ class MeshSampler {
     const auto& triangles = mesh_.triangles();
     for (std::size_t k = 0; k < triangles.size(); ++k) {
       const Corners c = corners_of(triangles[k]);
-      if (c[0].nearness == 0 || c[1].nearness == 0 || c[2].nearness == 0) continue;
-      // v runs down: counterclockwise from outside is clockwise in numbers.
-      if (doubled_area(c) < 0) scan(grid, c, static_cast<int>(k), first, end);
+      if (is_seen(c)) scan(grid, c, static_cast<int>(k), first, end);
     }
   }
 
@@ -327,8 +353,7 @@ class MeshSampler {
       const Facet& f = facets_[k];
       const SurfaceMaterial& m = material(t);
       const Corners corners = corners_of(t);
-      const bool is_seen = corners[0].nearness != 0 && corners[1].nearness != 0 &&
-                           corners[2].nearness != 0 && doubled_area(corners) < 0;
+      const bool is_turned_here = is_seen(corners);
       for (std::size_t i = 0; i < 3; ++i) {
         const Corner& c = corners[i];
         const Vec3& p = vertex(t, i);
@@ -336,8 +361,8 @@ class MeshSampler {
         const double farness = high > low ? (high - c.nearness) / (high - low) : 0.5;
         out.vertices.push_back({.u = float(c.u),
                                 .v = float(c.v),
-                                .depth = is_seen ? float(2 * farness - 1) : 2.0f,
-                                .distance = is_seen ? float(1 / c.nearness) : 1.0f,
+                                .depth = is_turned_here ? float(2 * farness - 1) : 2.0f,
+                                .distance = is_turned_here ? float(1 / c.nearness) : 1.0f,
                                 .position = {float(p.x), float(p.y), float(p.z)},
                                 .normal = {float(n.x), float(n.y), float(n.z)},
                                 .cosine = float(f.cosine),
@@ -373,6 +398,11 @@ class MeshSampler {
   struct Facet {
     Vec3 normal_B;
     double cosine = 0, lambert = 0, earthshine = 0;
+    // From here on of those in sunlight that are turned to the camera.
+    double first_u = 0, first_v = 0;
+    Linear nearness, map_u, map_v, map_nearness;  // the latter three times the nearness
+    double slack = 0;
+    bool is_glossy = false;
   };
   void light_facets() {
     for (const Mesh::Triangle& t : mesh_.triangles()) {
@@ -395,15 +425,44 @@ class MeshSampler {
     return mesh_.materials()[static_cast<std::size_t>(t.material)];
   }
 
+  // Where the sunlit facets that are turned to the camera are in the shadow map: linear in the
+  // image after multiplication by the nearness, which is linear, too (perspective).
+  void place_facets(const ShadowMap& shadows) {
+    for (std::size_t k = 0; k < facets_.size(); ++k) {
+      Facet& f = facets_[k];
+      const Mesh::Triangle& t = mesh_.triangles()[k];
+      const Corners c = corners_of(t);
+      if (f.cosine <= 0 || !is_seen(c)) continue;
+      const Corner p[3] = {shadows.place(vertex(t, 0)), shadows.place(vertex(t, 1)),
+                           shadows.place(vertex(t, 2))};
+      const double n[3] = {c[0].nearness, c[1].nearness, c[2].nearness};
+      f.first_u = c[0].u, f.first_v = c[0].v;
+      f.nearness = {c, n[0], n[1], n[2]};
+      f.map_u = {c, n[0] * p[0].u, n[1] * p[1].u, n[2] * p[2].u};
+      f.map_v = {c, n[0] * p[0].v, n[1] * p[1].v, n[2] * p[2].v};
+      f.map_nearness = {c, n[0] * p[0].nearness, n[1] * p[1].nearness, n[2] * p[2].nearness};
+      f.slack = shadows.slack(f.cosine);
+      f.is_glossy = material(t).specular != 0;
+    }
+  }
+  // v runs down: counterclockwise from outside is clockwise in numbers.
+  static bool is_seen(const Corners& c) {
+    return c[0].nearness != 0 && c[1].nearness != 0 && c[2].nearness != 0 && doubled_area(c) < 0;
+  }
+
   double radiance(int id, int column, int row, const ShadowMap& shadows) const {
-    const Mesh::Triangle& t = mesh_.triangles()[static_cast<std::size_t>(id)];
     const Facet& f = facets_[static_cast<std::size_t>(id)];
     if (f.cosine <= 0) return f.earthshine;
+    const double du = column + 0.5 - f.first_u, dv = row + 0.5 - f.first_v;
+    const double distance = 1 / f.nearness.at(du, dv);
+    const Corner in_map{f.map_u.at(du, dv) * distance, f.map_v.at(du, dv) * distance,
+                        f.map_nearness.at(du, dv) * distance};
+    if (!shadows.is_lit(in_map, id, f.slack)) return f.earthshine;
+    if (!f.is_glossy) return f.earthshine + f.lambert;
+    const Mesh::Triangle& t = mesh_.triangles()[static_cast<std::size_t>(id)];
     const Vec3 p = point_B(t, corners_of(t), column + 0.5, row + 0.5);
-    if (!shadows.is_lit(p, id, f.cosine)) return f.earthshine;
-    const SurfaceMaterial& m = material(t);
-    if (m.specular == 0) return f.earthshine + f.lambert;
-    return f.earthshine + f.lambert + shading_.lobe(m, f.normal_B, f.cosine, unit(camera_B_ - p));
+    return f.earthshine + f.lambert +
+           shading_.lobe(material(t), f.normal_B, f.cosine, unit(camera_B_ - p));
   }
 
   const Mesh& mesh_;
@@ -506,21 +565,42 @@ void spread_rows(Image<float>& image, const JoinedSamples& s, const std::vector<
   }
 }
 
+// Of one row of samples, about its begin. Four sums side by side do not wait for each other.
+struct Moments {
+  double total = 0, first = 0;
+};
+template <class Value>
+Moments moments(const std::vector<Value>& values, int row, int columns) {
+  const Value* value =
+      values.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(columns);
+  double total[4] = {}, first[4] = {};
+  const auto add = [&](int lane, int column) {
+    const double weight = value[column];
+    total[lane] += weight, first[lane] += weight * (column + 0.5);
+  };
+  int column = 0;
+  for (; column + 4 <= columns; column += 4) {
+    for (int lane = 0; lane < 4; ++lane) add(lane, column + lane);
+  }
+  for (; column < columns; ++column) add(0, column);
+  return {(total[0] + total[1]) + (total[2] + total[3]),
+          (first[0] + first[1]) + (first[2] + first[3])};
+}
+
 }  // namespace
 
 double MeshSamples::total_suns() const {
-  return std::accumulate(suns.begin(), suns.end(), 0.0);
+  double total = 0;
+  for (int row = 0; row < rows; ++row) total += moments(suns, row, columns).total;
+  return total;
 }
 
 Pixel MeshSamples::photocentre() const {
   double total = 0, u = 0, v = 0;
   const bool is_dark = total_suns() == 0;
-  std::size_t at = 0;
   for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column, ++at) {
-      const double weight = is_dark ? covered[at] : double(suns[at]);
-      total += weight, u += weight * (column + 0.5), v += weight * (row + 0.5);
-    }
+    const Moments m = is_dark ? moments(covered, row, columns) : moments(suns, row, columns);
+    total += m.total, u += m.first, v += m.total * (row + 0.5);
   }
   if (total == 0) return {left, top};
   return {left + u / total / per_px_u, top + v / total / per_px_v};
@@ -537,14 +617,16 @@ MeshSamples sample_mesh(const Mesh& mesh, const PinholeCamera& camera, const Mes
 }
 
 void add_samples(ElectronImage& image, Image<float>& covered, const MeshSamples& s,
-                 double electrons_per_sun, double psf_sigma_px, double weight, int threads) {
+                 double electrons_per_sun, double psf_sigma_px, double weight, int threads,
+                 int left_px, int top_px) {
   if (s.suns.empty()) return;
   const double finest = std::min(s.per_px_u, s.per_px_v);
   const double size_px = s.columns / s.per_px_u;
   const double enough = std::max(kSpreadPerPixel, kSpreadAcross / size_px);
   const JoinedSamples joined(s, std::max(1, static_cast<int>(finest / enough)));
-  const Spread across(joined.columns, s.left, joined.per_px_u, psf_sigma_px, image.width_px);
-  const Spread down(joined.rows, s.top, joined.per_px_v, psf_sigma_px, image.height_px);
+  const Spread across(joined.columns, s.left - left_px, joined.per_px_u, psf_sigma_px,
+                      image.width_px);
+  const Spread down(joined.rows, s.top - top_px, joined.per_px_v, psf_sigma_px, image.height_px);
   const auto spread_covered = [&] {
     spread_rows(covered, joined, joined.covered, across, down, weight / (s.per_px_u * s.per_px_v));
   };

@@ -49,7 +49,9 @@ MeshSamples sample_mesh(const Mesh& mesh, const PinholeCamera& camera, const Mes
 
 /// Spreads the samples over the pixels by the PSF, each integrated over the pixels.
 /// @param covered  To which the covered part of each pixel, blurred likewise, is added.
+/// @param left_px, top_px  The first pixel of both images, which may be a part of the camera's.
 void add_samples(ElectronImage& image, Image<float>& covered, const MeshSamples& samples,
-                 double electrons_per_sun, double psf_sigma_px, double weight = 1, int threads = 1);
+                 double electrons_per_sun, double psf_sigma_px, double weight = 1, int threads = 1,
+                 int left_px = 0, int top_px = 0);
 
 }  // namespace orrery

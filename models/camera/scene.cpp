@@ -49,11 +49,26 @@ void for_all(int threads, const Image<float>& image, const Work& work) {
 }
 
 // `upper` covers what `lower` has.
-void cover(ElectronImage& lower, const Image<float>& covered, const ElectronImage& upper,
-           int threads) {
-  for_all(threads, lower, [&](std::size_t k) {
-    lower.values[k] = lower.values[k] * std::max(0.0f, 1 - covered.values[k]) + upper.values[k];
-  });
+void cover(float& lower, float covered, float upper) {
+  lower = lower * std::max(0.0f, 1 - covered) + upper;
+}
+
+// Of an image: all pixels that samples reach.
+struct Part {
+  int left_px = 0, top_px = 0, width_px = 0, height_px = 0;
+};
+Part part_of(const Image<float>& image, const MeshSamples& s, double sigma_px) {
+  const double reach = std::ceil(5 * sigma_px) + 1;
+  const auto within = [](double at, int size) {
+    return static_cast<int>(std::clamp(at, 0.0, double(size)));
+  };
+  Part part{within(std::floor(s.left - reach), image.width_px),
+            within(std::floor(s.top - reach), image.height_px)};
+  part.width_px =
+      within(std::ceil(s.left + s.columns / s.per_px_u + reach) + 1, image.width_px) - part.left_px;
+  part.height_px =
+      within(std::ceil(s.top + s.rows / s.per_px_v + reach) + 1, image.height_px) - part.top_px;
+  return part;
 }
 
 }  // namespace
@@ -144,10 +159,13 @@ void Scene::draw_background(SceneFrame& frame, const SceneState& state,
   const int count =
       instants(norm(state.camera.omega_CI_C) * exposure.duration_s * focal_px(camera_));
   Image<float> sky(frame.light.width_px, frame.light.height_px);
+  bool is_empty = true;
   if (options_.sun_and_moon) {
     for (int k = 0; k < count; ++k) {
       const double dt = instant_s(k, count, exposure.duration_s);
-      draw_discs(sky, state, state.camera.R_CI_after(dt), 1.0f / static_cast<float>(count));
+      if (draw_discs(sky, state, state.camera.R_CI_after(dt), 1.0f / static_cast<float>(count))) {
+        is_empty = false;
+      }
     }
   }
   if (has_earth) {
@@ -158,17 +176,21 @@ void Scene::draw_background(SceneFrame& frame, const SceneState& state,
       earth_.add(suns, covered, rays_, earth_pose(state, dt), 1.0f / static_cast<float>(count),
                  threads, gl_.get());
     }
-    cover(sky, covered, suns, threads);
+    if (is_empty) {
+      sky = std::move(suns);
+    } else {
+      for_all(threads, sky,
+              [&](std::size_t k) { cover(sky.values[k], covered.values[k], suns.values[k]); });
+    }
+    is_empty = false;
   }
-  const bool is_empty = !has_earth && std::all_of(sky.values.begin(), sky.values.end(),
-                                                  [](float suns) { return suns == 0; });
   if (is_empty) return;
   blur(sky, optics_.options().psf_sigma_px, threads);
   const float scale = static_cast<float>(optics_.electrons_ps_of_suns(exposure.duration_s));
   for_all(threads, sky, [&](std::size_t k) { frame.light.values[k] = scale * sky.values[k]; });
 }
 
-void Scene::draw_discs(Image<float>& suns, const SceneState& state, const Mat3& R_CI,
+bool Scene::draw_discs(Image<float>& suns, const SceneState& state, const Mat3& R_CI,
                        float weight) const {
   const Vec3& r = state.camera.r_ECI;
   const Vec3 sun = state.r_sun_ECI - r, moon = state.r_moon_ECI - r;
@@ -178,14 +200,16 @@ void Scene::draw_discs(Image<float>& suns, const SceneState& state, const Mat3& 
   const double au = kAstronomicalUnit_m / norm(sun);
   const Vec3 sun_C = seen_C(sun);
   const double field = camera_.half_field_rad() + 0.02;
-  if (sun_C.z > std::cos(std::min(field, 1.5))) {
+  const bool is_sun_near = sun_C.z > std::cos(std::min(field, 1.5));
+  if (is_sun_near) {
     add_disc(
         suns, camera_,
         {.direction_C = sun_C, .radius_rad = std::asin(kRadiusSun_m / norm(sun)), .suns = au * au},
         weight);
   }
   const Vec3 moon_C = seen_C(moon);
-  if (norm(state.r_moon_ECI) > 0 && moon_C.z > std::cos(std::min(field, 1.5))) {
+  const bool is_moon_near = norm(state.r_moon_ECI) > 0 && moon_C.z > std::cos(std::min(field, 1.5));
+  if (is_moon_near) {
     const double magnitude = moon_magnitude(state.r_moon_ECI, state.r_sun_ECI, r);
     add_disc(suns, camera_,
              {.direction_C = moon_C,
@@ -195,6 +219,7 @@ void Scene::draw_discs(Image<float>& suns, const SceneState& state, const Mat3& 
               .to_sun_C = R_CI * unit(state.r_sun_ECI - state.r_moon_ECI)},
              weight);
   }
+  return is_sun_near || is_moon_near;
 }
 
 struct Scene::TargetView {
@@ -269,20 +294,32 @@ void Scene::draw_mesh(ElectronImage& image, Image<float>& covered, const TargetV
   const double half = 0.5 * exposure.duration_s;
   const std::optional<Pixel> begin = origin_at(-half), end = origin_at(half);
   const int count = begin && end ? instants(std::hypot(end->u - begin->u, end->v - begin->v)) : 1;
-  ElectronImage layer(image.width_px, image.height_px);
-  Image<float> layer_covered(image.width_px, image.height_px);
+  const double sigma_px = optics_.options().psf_sigma_px;
+  // With one instant the light's extent is known.
+  const Part part =
+      count == 1 ? part_of(image, middle, sigma_px) : Part{0, 0, image.width_px, image.height_px};
+  if (part.width_px <= 0 || part.height_px <= 0) return;
+  ElectronImage layer(part.width_px, part.height_px);
+  Image<float> layer_covered(part.width_px, part.height_px);
   const double electrons_per_sun = optics_.electrons_ps_of_suns(exposure.duration_s);
   for (int k = 0; k < count; ++k) {
     const MeshPose pose = view.at(instant_s(k, count, exposure.duration_s));
     add_samples(
         layer, layer_covered,
         count == 1 ? middle : sample_mesh(view.mesh, camera_, pose, view.light, threads, gl_.get()),
-        electrons_per_sun, optics_.options().psf_sigma_px, 1.0 / count, threads);
+        electrons_per_sun, sigma_px, 1.0 / count, threads, part.left_px, part.top_px);
   }
-  cover(image, layer_covered, layer, threads);
   if (covered.values.empty()) covered = Image<float>(image.width_px, image.height_px);
-  for_all(threads, covered, [&](std::size_t k) {
-    covered.values[k] = std::max(covered.values[k], layer_covered.values[k]);
+  for_bands_of_rows(threads, part.height_px, [&](int first_row, int end_row) {
+    for (int row = first_row; row < end_row; ++row) {
+      const std::size_t to = image.index(part.left_px, part.top_px + row);
+      const std::size_t from = layer.index(0, row);
+      for (std::size_t k = 0; k < static_cast<std::size_t>(part.width_px); ++k) {
+        const float upper_covered = layer_covered.values[from + k];
+        cover(image.values[to + k], upper_covered, layer.values[from + k]);
+        covered.values[to + k] = std::max(covered.values[to + k], upper_covered);
+      }
+    }
   });
 }
 

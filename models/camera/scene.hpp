@@ -93,7 +93,8 @@ class Scene {
                                      const StarField::IsHidden& is_hidden) const;
   void draw_background(SceneFrame& frame, const SceneState& state, const ExposureTime& exposure,
                        int threads);
-  void draw_discs(Image<float>& suns, const SceneState& state, const Mat3& R_CI,
+  // False: none is near the image.
+  bool draw_discs(Image<float>& suns, const SceneState& state, const Mat3& R_CI,
                   float weight) const;
   std::optional<SeenTarget> draw_target(SceneFrame& frame, Image<float>& covered, std::size_t index,
                                         const SceneState& state, const ExposureTime& exposure,
