@@ -118,43 +118,49 @@ class EarthRays {
 
   // False: nothing of the Earth is seen.
   bool cross(const PixelRay* rays, int count, Together& t) const {
-    const Mat3& R = R_EC_;
+    const Mat3 R = R_EC_;  // copies, which the loop's results cannot change
+    const Vec3 beta = beta_C_, p = p_;
+    const double stretch = stretch_, c = c_;
     for (int i = 0; i < count; ++i) {
       const double x = rays[i].x, y = rays[i].y, z = rays[i].z;
-      const double along = x * beta_C_.x + y * beta_C_.y + z * beta_C_.z;
-      const double u = x - beta_C_.x + along * x, v = y - beta_C_.y + along * y,
-                   w = z - beta_C_.z + along * z;
+      const double along = x * beta.x + y * beta.y + z * beta.z;
+      const double u = x - beta.x + along * x, v = y - beta.y + along * y,
+                   w = z - beta.z + along * z;
       const double dx = R.row_x.x * u + R.row_x.y * v + R.row_x.z * w;
       const double dy = R.row_y.x * u + R.row_y.y * v + R.row_y.z * w;
       const double dz = R.row_z.x * u + R.row_z.y * v + R.row_z.z * w;
-      const double qz = dz * stretch_;
+      const double qz = dz * stretch;
       const double a = dx * dx + dy * dy + qz * qz;
-      const double b = dx * p_.x + dy * p_.y + qz * p_.z;
+      const double b = dx * p.x + dy * p.y + qz * p.z;
       t.dx[i] = dx, t.dy[i] = dy, t.dz[i] = dz;
       t.a[i] = a, t.b[i] = b;
-      t.height[i] = 0.5 * (c_ - b * b / a);
+      t.height[i] = 0.5 * (c - b * b / a);
     }
+    const double top = top_;
     int seen = 0;
     for (int i = 0; i < count; ++i) {
       // Half a pixel at the tangent point, squared, against the height: as look() has it.
       const double a = t.a[i], b = t.b[i], h = t.height[i];
       t.is_edge[i] = h * h * a * a < 0.25 * b * b * double(rays[i].solid_angle_sr);
-      t.is_seen[i] = b < 0 && (h < top_ || t.is_edge[i]);
+      t.is_seen[i] = (b < 0) & ((h < top) | t.is_edge[i]);
       seen += t.is_seen[i];
     }
     return seen > 0;
   }
 
   void find_normals(int count, Together& t) const {
+    const Vec3 p = p_, to_sun = to_sun_;
+    const double stretch = stretch_, c = c_;
     for (int i = 0; i < count; ++i) {
       const double a = t.a[i], b = t.b[i];
-      const double root2 = b * b - a * c_;
-      const double way = (-b - std::sqrt(root2 > 0 ? root2 : 0)) / a;
-      const double x = p_.x + way * t.dx[i], y = p_.y + way * t.dy[i];
-      const double z = (p_.z + way * (t.dz[i] * stretch_)) * stretch_;
+      const double root2 = b * b - a * c;
+      const double positive = 0.5 * (root2 + std::abs(root2));  // exactly, and without a branch
+      const double way = (-b - std::sqrt(positive)) / a;
+      const double x = p.x + way * t.dx[i], y = p.y + way * t.dy[i];
+      const double z = (p.z + way * (t.dz[i] * stretch)) * stretch;
       const double scale = 1 / std::sqrt(x * x + y * y + z * z);
       t.nx[i] = x * scale, t.ny[i] = y * scale, t.nz[i] = z * scale;
-      t.cosine[i] = t.nx[i] * to_sun_.x + t.ny[i] * to_sun_.y + t.nz[i] * to_sun_.z;
+      t.cosine[i] = t.nx[i] * to_sun.x + t.ny[i] * to_sun.y + t.nz[i] * to_sun.z;
     }
   }
 
