@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
+#include <optional>
 #include <thread>
 
 namespace orrery {
@@ -596,14 +596,17 @@ double MeshSamples::total_suns() const {
 }
 
 Pixel MeshSamples::photocentre() const {
-  double total = 0, u = 0, v = 0;
-  const bool is_dark = total_suns() == 0;
-  for (int row = 0; row < rows; ++row) {
-    const Moments m = is_dark ? moments(covered, row, columns) : moments(suns, row, columns);
-    total += m.total, u += m.first, v += m.total * (row + 0.5);
-  }
-  if (total == 0) return {left, top};
-  return {left + u / total / per_px_u, top + v / total / per_px_v};
+  const auto centre_of = [this](const auto& values) -> std::optional<Pixel> {
+    double total = 0, u = 0, v = 0;
+    for (int row = 0; row < rows; ++row) {
+      const Moments m = moments(values, row, columns);
+      total += m.total, u += m.first, v += m.total * (row + 0.5);
+    }
+    if (total == 0) return {};
+    return Pixel{left + u / total / per_px_u, top + v / total / per_px_v};
+  };
+  if (const auto of_light = centre_of(suns)) return *of_light;
+  return centre_of(covered).value_or(Pixel{left, top});
 }
 
 double MeshSamples::area_px2() const {
