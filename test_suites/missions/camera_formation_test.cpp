@@ -322,7 +322,7 @@ int overtaking(const std::vector<Arrival>& arrivals) {
 //   each image comes once, in the order of exposure + read-out + transfer, and says when it began;
 //   centroids     within the disc of the target (its centre of light is not its centre), 0.146 px
 //                 at 2 km, and 0.1 px of noise; seen 0.08
-//   predicted     from GNSS differences of 2.1 m per axis: 2.0 px at 2 km; 3 px in both, seen 3.0
+//   predicted     from GNSS differences of 2.1 m per axis: 2.0 px at 2 km; 3 px in both, seen 2.7
 //   errors over their sigmas   RMS 1; attitudes of 60 numbers each, whose neighbours share stars
 TEST(CameraFormationTest, TwoCamerasAndGnssAtTheirOwnRatesOnThreeSpacecraft) {
   CameraFormation world({.seed = 5});
