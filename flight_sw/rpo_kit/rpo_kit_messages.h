@@ -12,6 +12,12 @@
  *   target, chaser -> ground and payloads: how the target is turned
  *     0 i64 t_ns | 8 f64 q_BI[4] | 40 f64 omega_BI_B[3] rad/s | 64 f64 sigma_rad[3], about B
  *     | 88 u32 poses, flips, rejected, lost: of the near-range filter, since boot
+ *   imaging, chaser -> ground: what a frame of the camera gave
+ *     0 i64 exposure_ns, of its middle | 8 u32 found: RPO_KIT_FOUND_ATTITUDE, _LOST (looked for
+ *     without a prediction), _TARGET | 12 u32 sources, identified as stars
+ *     | 20 f64 q_CI[4], the camera's attitude | 52 f64 attitude_sigma_rad[3], about C
+ *     | 76 f64 direction_ECI[3] of the target | 100 f64 sigma_rad, per axis
+ *     | 108 f64 u, v px of the target; zero where not found
  *   telemetry, chaser -> ground
  *     0 i64 t_ns | 8 u32 mode | 12 u32 waypoint | 16 f64 a_roe_m[6] | 64 f64 sigma_m[6]
  *     | 112 f64 delta_v_mps | 120 u32 burns | 124 u32 used[3]: GNSS, directions, poses
@@ -36,6 +42,9 @@
   (RPO_KIT_KEYPOINTS_HEAD_BYTES + RPO_KIT_MOST_KEYPOINTS * RPO_KIT_KEYPOINT_BYTES)
 #define RPO_KIT_BEARING_BYTES 40u
 #define RPO_KIT_TARGET_BYTES 104u
+#define RPO_KIT_IMAGING_BYTES 124u
+
+enum { RPO_KIT_FOUND_ATTITUDE = 1, RPO_KIT_FOUND_LOST = 2, RPO_KIT_FOUND_TARGET = 4 };
 
 enum { RPO_KIT_GO = 1, RPO_KIT_HOLD = 2, RPO_KIT_ABORT = 3 };
 
@@ -129,6 +138,44 @@ typedef struct rpo_kit_target {
   double q_BI[4], omega_BI_B[3], sigma_rad[3];
   uint32_t poses, flips, rejected, lost;
 } rpo_kit_target;
+
+typedef struct rpo_kit_imaging {
+  int64_t exposure_ns;
+  uint32_t found, sources, identified;
+  double q_CI[4], attitude_sigma_rad[3];
+  double direction_ECI[3], sigma_rad, u_px, v_px;
+} rpo_kit_imaging;
+
+ORRERY_MAYBE_UNUSED static void rpo_kit_put_imaging(unsigned char* message,
+                                                    const rpo_kit_imaging* r) {
+  orrery_put_i64(message, r->exposure_ns);
+  orrery_put_u32(message + 8, r->found);
+  orrery_put_u32(message + 12, r->sources);
+  orrery_put_u32(message + 16, r->identified);
+  orrery_put_f64s(message + 20, r->q_CI, 4);
+  orrery_put_f64s(message + 52, r->attitude_sigma_rad, 3);
+  orrery_put_f64s(message + 76, r->direction_ECI, 3);
+  orrery_put_f64(message + 100, r->sigma_rad);
+  orrery_put_f64(message + 108, r->u_px);
+  orrery_put_f64(message + 116, r->v_px);
+}
+
+/* 1 if the length is right; otherwise 0, and nothing is written. */
+ORRERY_MAYBE_UNUSED static int rpo_kit_get_imaging(const unsigned char* message, uint32_t bytes,
+                                                   rpo_kit_imaging* r) {
+  if (bytes != RPO_KIT_IMAGING_BYTES) return 0;
+  r->exposure_ns = orrery_get_i64(message);
+  r->found = orrery_get_u32(message + 8);
+  r->sources = orrery_get_u32(message + 12);
+  r->identified = orrery_get_u32(message + 16);
+  orrery_get_f64s(message + 20, r->q_CI, 4);
+  orrery_get_f64s(message + 52, r->attitude_sigma_rad, 3);
+  orrery_get_f64s(message + 76, r->direction_ECI, 3);
+  r->sigma_rad = orrery_get_f64(message + 100);
+  r->u_px = orrery_get_f64(message + 108);
+  r->v_px = orrery_get_f64(message + 116);
+  return 1;
+}
 
 ORRERY_MAYBE_UNUSED static void rpo_kit_put_bearing(unsigned char* message,
                                                     const rpo_kit_bearing* b) {

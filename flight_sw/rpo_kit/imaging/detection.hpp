@@ -48,6 +48,12 @@ class PointSourceDetector {
 
   PointSourceDetector(int width, int height, const DetectionOptions& options = {});
 
+  /// Of the next images, where they differ from the options.
+  void set_conversion(double electrons_per_dn, double saturation_dn) {
+    options_.electrons_per_dn = electrons_per_dn;
+    options_.saturation_dn = saturation_dn;
+  }
+
   /// Brightest first; the centroid's window lies inside the image.
   /// @return false, and nothing found, if the image is not of the size that was announced.
   bool detect(const ImageView& image, std::vector<Detection>* found);

@@ -28,9 +28,17 @@ StarCatalogue::StarCatalogue(std::vector<Star> stars, double pair_magnitude,
                    [](const Star& a, const Star& b) { return a.magnitude < b.magnitude; });
   if (stars_.size() > kMostStars) stars_.resize(kMostStars);
   const double least_cosine = std::cos(max_pair_angle_rad);
-  for (std::size_t a = 0; a < stars_.size() && stars_[a].magnitude <= pair_magnitude; ++a) {
+  const auto near = [&](std::size_t a, std::size_t b) {
+    return dot(stars_[a].direction_ECI, stars_[b].direction_ECI) >= least_cosine;
+  };
+  std::size_t bright = 0, count = 0;
+  for (; bright < stars_.size() && stars_[bright].magnitude <= pair_magnitude; ++bright) {
+    for (std::size_t b = 0; b < bright; ++b) count += near(bright, b) ? 1 : 0;
+  }
+  pairs_.reserve(count);  // to the pair: a list that grows by doubling would take twice as much
+  for (std::size_t a = 0; a < bright; ++a) {
     for (std::size_t b = 0; b < a; ++b) {
-      if (dot(stars_[a].direction_ECI, stars_[b].direction_ECI) < least_cosine) continue;
+      if (!near(a, b)) continue;
       const double angle = angle_between(stars_[a].direction_ECI, stars_[b].direction_ECI);
       pairs_.push_back({static_cast<float>(angle), static_cast<std::uint16_t>(b),
                         static_cast<std::uint16_t>(a)});

@@ -135,10 +135,14 @@ bool StarIdentifier::refine(const std::vector<SeenSource>& seen, const Vec3& v_E
                             const Mat3& R_CI, double reach_rad, Identification* result) {
   collect_field(R_CI);
   if (!match(seen, v_ECI, R_CI, reach_rad, result)) return false;
+  // A wrong star among many moves the attitude by a part of the first reach, which its covariance
+  // does not know.
+  double least = reach_rad;
   for (int round = 0; round < 2; ++round) {
     const Mat3 better = result->attitude.R_CI;
-    const double reach =
-        options_.sigmas * reach_of(result->attitude.covariance_C, options_.field_radius_rad);
+    least = round == 0 ? 0.1 * least : 0.0;
+    const double reach = std::max(least, options_.sigmas * reach_of(result->attitude.covariance_C,
+                                                                    options_.field_radius_rad));
     if (!match(seen, v_ECI, better, reach, result)) return false;
   }
   return result->identified >= needed(seen.size());

@@ -43,14 +43,17 @@ bool TargetTracker::is_hot(const Detection& detection) {
   return false;
 }
 
-bool TargetTracker::is_star(const UnknownSource& source) const {
+bool TargetTracker::is_star(const UnknownSource& source) {
+  bool star = false;
   for (const std::vector<UnknownSource>& frame : before_) {
-    for (const UnknownSource& earlier : frame) {
-      const double reach = options_.sigmas * std::hypot(source.sigma_rad, earlier.sigma_rad);
-      if (norm(source.direction_ECI - earlier.direction_ECI) < reach) return true;
+    for (std::size_t k = 0; k < frame.size(); ++k) {
+      const double reach = options_.sigmas * std::hypot(source.sigma_rad, frame[k].sigma_rad);
+      if (norm(source.direction_ECI - frame[k].direction_ECI) >= reach) continue;
+      star = true;
+      if (&frame == before_) was_star_[k] = true;
     }
   }
-  return false;
+  return star;
 }
 
 double TargetTracker::gate_rad(const Track& track, double dt_s, double sigma_rad) const {
@@ -58,8 +61,9 @@ double TargetTracker::gate_rad(const Track& track, double dt_s, double sigma_rad
   const double max_rate = options_.max_rate * n;
   if (track.hits < 2) return max_rate * dt_s;
   const double noise = std::hypot(track.sigma_rad, sigma_rad);
-  // The rate is from two places `dt` apart, so its noise counts once more.
-  return options_.sigmas * 2.5 * noise + 0.5 * options_.curvature * max_rate * n * dt_s * dt_s;
+  // The rate is from two places `dt` apart, so its noise counts once more, and it is that of half
+  // of `dt` ago.
+  return options_.sigmas * 2.5 * noise + options_.curvature * max_rate * n * dt_s * dt_s;
 }
 
 void TargetTracker::hit(Track* track, const UnknownSource& source, const Vec3& direction_H,
@@ -71,6 +75,7 @@ void TargetTracker::hit(Track* track, const UnknownSource& source, const Vec3& d
   track->direction_H = direction_H;
   track->t_ns = t_ns;
   track->sigma_rad = source.sigma_rad;
+  track->flux_dn = source.detection.flux_dn;
   ++track->hits;
   track->history |= 1u;
 }
@@ -88,6 +93,11 @@ void TargetTracker::associate(std::int64_t t_ns, const Mat3& R_HI,
     double nearest = INFINITY;
     for (std::size_t k = 0; k < sources.size(); ++k) {
       if (!usable_[k]) continue;
+      const double flux = sources[k].detection.flux_dn;
+      if (flux > options_.flux_ratio * track.flux_dn ||
+          track.flux_dn > options_.flux_ratio * flux) {
+        continue;
+      }
       const double away = norm(R_HI * sources[k].direction_ECI - predicted);
       if (away < nearest && away < gate_rad(track, dt_s, sources[k].sigma_rad)) {
         nearest = away;
@@ -115,6 +125,7 @@ void TargetTracker::begin_tracks(std::int64_t t_ns, const Mat3& R_HI,
     track.direction_H = R_HI * sources[k].direction_ECI;
     track.t_ns = t_ns;
     track.sigma_rad = sources[k].sigma_rad;
+    track.flux_dn = sources[k].detection.flux_dn;
     track.hits = 1;
     track.history = 1u;
     track.source = static_cast<int>(k);
@@ -131,6 +142,7 @@ void TargetTracker::frame(std::int64_t t_ns, const Mat3& R_HI,
     }
   }
   usable_.assign(sources.size(), true);
+  was_star_.assign(before_[0].size(), false);
   stars_ = hot_ = 0;
   for (Stuck& place : stuck_) place.seen = false;
   for (std::size_t k = 0; k < sources.size(); ++k) {
@@ -144,6 +156,12 @@ void TargetTracker::frame(std::int64_t t_ns, const Mat3& R_HI,
   }
   stuck_.erase(std::remove_if(stuck_.begin(), stuck_.end(), [](const Stuck& s) { return !s.seen; }),
                stuck_.end());
+  tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(),
+                               [&](const Track& t) {
+                                 return t.source >= 0 &&
+                                        was_star_[static_cast<std::size_t>(t.source)];
+                               }),
+                tracks_.end());
   associate(t_ns, R_HI, sources);
   const std::uint32_t recent = (1u << options_.lost_frames) - 1u;
   tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(),

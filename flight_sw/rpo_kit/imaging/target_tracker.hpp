@@ -3,6 +3,7 @@
 /// Method      By motion. Directions are kept in the observer's RTN, where a target drifts slowly
 ///             and nearly on a straight line, whereas stars, known or not, turn at the orbital
 ///             rate: what was at the same inertial direction in one of the last frames is a star.
+///             A track that ended on such a star was none.
 ///             A hot pixel is sharper than the optics allow, or stays on its pixel's centre from
 ///             frame to frame. Several tracks are followed at a time; one is confirmed by 3 hits in
 ///             5 frames that fit one rate.
@@ -20,9 +21,10 @@ namespace rpo_kit {
 
 struct TrackerOptions {
   double orbital_rate_radps = 1.1e-3;
-  double max_rate = 0.25;  ///< of the orbital rate, of a target in RTN
-  double sigmas = 4.0;     ///< of association
-  double curvature = 0.5;  ///< acceleration, as a part of n times `max_rate` times n
+  double max_rate = 0.25;   ///< of the orbital rate, of a target in RTN
+  double sigmas = 4.0;      ///< of association
+  double curvature = 1.0;   ///< acceleration, as a part of n times `max_rate` times n
+  double flux_ratio = 3.0;  ///< by which a target may become brighter or fainter from hit to hit
   int confirm_hits = 3, confirm_frames = 5;
   int lost_frames = 6;     ///< without a hit, then a track ends
   double stuck_px = 0.06;  ///< from a pixel's centre and from frame to frame
@@ -41,6 +43,7 @@ struct Track {
   flight_support::Vec3 direction_H, rate_H;  ///< unit vector in RTN and its derivative [1/s]
   std::int64_t t_ns = 0;                     ///< of the last hit
   double sigma_rad = 0.0;
+  double flux_dn = 0.0;
   int hits = 0;
   std::uint32_t history = 0;  ///< a bit per frame, the newest lowest
   bool confirmed = false;
@@ -51,6 +54,9 @@ class TargetTracker {
  public:
   explicit TargetTracker(const TrackerOptions& options = {}, double hot_sharpness = 0.47)
       : options_(options), hot_sharpness_(hot_sharpness) {}
+
+  /// Of a target in RTN, from the next frame on.
+  void set_max_rate(double max_rate) { options_.max_rate = max_rate; }
 
   /// A frame. @param R_HI  Turns ECI into the observer's RTN at `t_ns`.
   void frame(std::int64_t t_ns, const flight_support::Mat3& R_HI,
@@ -72,7 +78,7 @@ class TargetTracker {
     bool seen;
   };
   bool is_hot(const Detection& detection);
-  bool is_star(const UnknownSource& source) const;
+  bool is_star(const UnknownSource& source);
   double gate_rad(const Track& track, double dt_s, double sigma_rad) const;
   void hit(Track* track, const UnknownSource& source, const flight_support::Vec3& direction_H,
            std::int64_t t_ns);
@@ -87,6 +93,7 @@ class TargetTracker {
   std::vector<Stuck> stuck_;
   std::vector<UnknownSource> before_[3];  // inertial, of the last frames, the newest first
   std::vector<bool> usable_;
+  std::vector<bool> was_star_;  // of the frame before
   int next_id_ = 1, stars_ = 0, hot_ = 0;
 };
 

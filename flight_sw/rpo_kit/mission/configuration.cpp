@@ -19,9 +19,11 @@ class Reader final : public flight_support::ConfigurationReader {
     if (std::strcmp(key, "role") == 0) return set_role(value);
     if (std::strcmp(key, "waypoint") == 0) return add_waypoint(value);
     if (std::strcmp(key, "keypoint") == 0) return add_keypoint(value);
+    if (std::strcmp(key, "star_catalogue") == 0) return set_star_catalogue(value);
     Configuration& c = *configuration_;
     Camera& camera = c.inspection.camera;
     double leap_seconds = c.earth_time.leap_seconds;
+    double width = c.imaging.width, height = c.imaging.height;
     const NumberKey keys[] = {
         {"crosslink_period_s", &c.crosslink_period_s, 1.0, 600.0},
         {"telemetry_period_s", &c.telemetry_period_s, 1.0, 86400.0},
@@ -44,13 +46,24 @@ class Reader final : public flight_support::ConfigurationReader {
         {"inertia_y", &c.inspection.filter.inertia[1], 1e-3, 1e3},
         {"inertia_z", &c.inspection.filter.inertia[2], 1e-3, 1e3},
         {"tumble_noise_rad2ps3", &c.inspection.filter.angular_rad2ps3, 0.0, 1.0},
+        {"image_width_px", &width, 0.0, 4096.0},
+        {"image_height_px", &height, 0.0, 4096.0},
+        {"psf_sigma_px", &c.imaging.detection.psf_sigma_px, 0.3, 5.0},
+        {"pair_magnitude", &c.imaging.pair_magnitude, -2.0, 20.0},
+        {"target_size_m", &c.imaging.target_size_m, 0.0, 100.0},
+        {"pointing_rad", &c.imaging.pointing_rad, 1e-5, 0.1},
     };
     for (std::size_t k = 0; k < sizeof keys / sizeof keys[0]; ++k) {
       if (std::strcmp(key, keys[k].name) != 0) continue;
       if (!set_number(keys[k], 1u << k, value)) return false;
       camera.fy = camera.fx;
       c.earth_time.leap_seconds = static_cast<int>(leap_seconds);
-      if (c.earth_time.leap_seconds != leap_seconds) return fail(key, "is no integer");
+      c.imaging.width = static_cast<int>(width);
+      c.imaging.height = static_cast<int>(height);
+      if (c.earth_time.leap_seconds != leap_seconds || c.imaging.width != width ||
+          c.imaging.height != height) {
+        return fail(key, "is no integer");
+      }
       return true;
     }
     return fail(key, "is no key of this package");
@@ -63,6 +76,16 @@ class Reader final : public flight_support::ConfigurationReader {
     if (!chaser && std::strcmp(value, "target") != 0)
       return fail("role", "is not target or chaser");
     configuration_->role = chaser ? Role::kChaser : Role::kTarget;
+    return true;
+  }
+
+  bool set_star_catalogue(const char* value) {
+    char* path = configuration_->star_catalogue;
+    if (*path != '\0') return fail("star_catalogue", "is given twice");
+    if (*value == '\0' || std::strlen(value) >= sizeof configuration_->star_catalogue) {
+      return fail("star_catalogue", "is no path of 1 to 95 characters");
+    }
+    std::strcpy(path, value);
     return true;
   }
 
@@ -113,6 +136,12 @@ bool parse_configuration(const char* text, std::size_t bytes, Configuration* con
   *configuration = Configuration();
   Reader reader(configuration, message, message_bytes);
   if (!reader.read(text, bytes)) return false;
+  ImagingOptions& imaging = configuration->imaging;
+  if (*configuration->star_catalogue != '\0' && (imaging.width < 64 || imaging.height < 64)) {
+    return reader.fail("star_catalogue", "needs image_width_px and image_height_px of 64 and more");
+  }
+  imaging.field_radius_rad = std::atan2(0.5 * std::hypot(imaging.width, imaging.height),
+                                        configuration->inspection.camera.fx);
   const NavigationOptions& n = configuration->navigation;
   configuration->approach.burn_error = std::hypot(n.burn_fraction, n.burn_direction_rad);
   return true;

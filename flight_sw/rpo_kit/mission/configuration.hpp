@@ -5,6 +5,8 @@
 
 #include "rpo_kit/fusion/relative_navigation.hpp"
 #include "rpo_kit/guidance/approach.hpp"
+#include "rpo_kit/imaging/frame_processor.hpp"
+#include "rpo_kit/imaging/hot_pixels.hpp"
 #include "rpo_kit/mission/autonomy.hpp"
 #include "rpo_kit/near_range/inspection.hpp"
 #include "support/orbit/earth_rotation.hpp"
@@ -24,6 +26,8 @@ struct Configuration {
   ApproachOptions approach = {};
   AutonomyOptions autonomy = {};
   InspectionOptions inspection = {};
+  ImagingOptions imaging = {};   ///< its camera's field is that of `inspection`
+  char star_catalogue[96] = "";  ///< path; empty: frames are not looked at
 };
 
 /// @param message  Gets one line naming line number, key and accepted range if the text is wrong.

@@ -2,6 +2,7 @@
 
 #include "orrery_flight.hpp"
 #include "orrery_messages.h"
+#include "rpo_kit/imaging/star_file.hpp"
 #include "rpo_kit/mission/rpo_kit.hpp"
 #include "rpo_kit/rpo_kit_messages.h"
 
@@ -22,10 +23,13 @@ enum PortId : std::uint32_t {
   kTelemetry = 7,
   kBearing = 8,
   kKeypoints = 9,
-  kTarget = 10
+  kTarget = 10,
+  kImage = 11,
+  kImaging = 12
 };
 
-constexpr int kPorts = 11;
+constexpr int kPorts = 13;
+constexpr std::uint32_t kMostImageBytes = 1u << 20;
 
 const unsigned char* data_of(Bytes bytes) {
   return static_cast<const unsigned char*>(bytes.data);
@@ -70,6 +74,9 @@ class HostOutputs final : public Outputs {
   void out_target(const unsigned char* message, std::uint32_t bytes) override {
     host_.output(kTarget, {message, bytes});
   }
+  void out_imaging(const unsigned char* message, std::uint32_t bytes) override {
+    host_.output(kImaging, {message, bytes});
+  }
   void out_telemetry(const unsigned char* packet, std::uint32_t bytes) override {
     host_.output(kTelemetry, {packet, bytes});
   }
@@ -102,6 +109,9 @@ class Library {
   std::int32_t keypoints(std::int64_t, Bytes bytes) {
     return status(kit_.in_keypoints(data_of(bytes), bytes.size));
   }
+  std::int32_t image(std::int64_t, Bytes bytes) {
+    return status(kit_.in_image(data_of(bytes), bytes.size));
+  }
   std::int32_t tick(std::int64_t now_ns) {
     kit_.in_tick(now_ns);
     return ORRERY_OK;
@@ -121,6 +131,7 @@ const Port (&Library::ports())[kPorts] {
       {kBearing, ORRERY_IN, ORRERY_PACKET, "bearing", RPO_KIT_BEARING_BYTES, &Library::bearing},
       {kKeypoints, ORRERY_IN, ORRERY_PACKET, "keypoints", RPO_KIT_KEYPOINTS_BYTES,
        &Library::keypoints},
+      {kImage, ORRERY_IN, ORRERY_PACKET, "camera", kMostImageBytes, &Library::image},
       {kCrosslink, ORRERY_OUT, ORRERY_PACKET, "crosslink", formation_keeping::kCrosslinkBytes,
        nullptr},
       {kThruster, ORRERY_OUT, ORRERY_PACKET, "thruster", ORRERY_THRUSTER_BYTES, nullptr},
@@ -128,6 +139,7 @@ const Port (&Library::ports())[kPorts] {
       {kMode, ORRERY_OUT, ORRERY_PACKET, "mode", ORRERY_MODE_BYTES, nullptr},
       {kTelemetry, ORRERY_OUT, ORRERY_PACKET, "telemetry", RPO_KIT_TELEMETRY_BYTES, nullptr},
       {kTarget, ORRERY_OUT, ORRERY_PACKET, "target", RPO_KIT_TARGET_BYTES, nullptr},
+      {kImaging, ORRERY_OUT, ORRERY_PACKET, "imaging", RPO_KIT_IMAGING_BYTES, nullptr},
   };
   return table;
 }
@@ -138,8 +150,11 @@ std::int32_t create_checked(void** self, const orrery_host* host,
                             const orrery_boot* boot) noexcept {
   Configuration configuration;
   char message[192];
-  if (!parse_configuration(static_cast<const char*>(boot->config), boot->config_bytes,
-                           &configuration, message, sizeof message)) {
+  const bool good = parse_configuration(static_cast<const char*>(boot->config), boot->config_bytes,
+                                        &configuration, message, sizeof message) &&
+                    (*configuration.star_catalogue == '\0' ||
+                     load_stars(configuration.star_catalogue, nullptr, message, sizeof message));
+  if (!good) {
     host->log(host->context, ORRERY_ERROR, message);
     return ORRERY_FATAL;
   }

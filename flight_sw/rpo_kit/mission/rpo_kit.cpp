@@ -4,7 +4,9 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <utility>
 
+#include "rpo_kit/imaging/star_file.hpp"
 #include "rpo_kit/rpo_kit_messages.h"
 #include "support/orbit/constants.hpp"
 
@@ -52,6 +54,42 @@ void quaternion_of_matrix(const Mat3& R, double q[4]) {
   for (int k = 0; k < 4; ++k) q[k] /= size;
 }
 
+// A track within that of where the target should be is the target's.
+constexpr double kLeastReach_rad = 1e-3, kReachSigmas = 4.0;
+
+// @return false: numbers that no camera has.
+bool frame_header(const orrery_image& image, FrameHeader* header) {
+  const double* f = image.fx_fy_cx_cy;
+  const double* k = image.k1_k2_p1_p2_k3;
+  for (int i = 0; i < 4; ++i) {
+    if (!(std::fabs(f[i]) < 1e7)) return false;
+  }
+  for (int i = 0; i < 5; ++i) {
+    if (!(std::fabs(k[i]) < 1e7)) return false;
+  }
+  if (!(f[0] >= 1.0 && f[1] >= 1.0) || !(image.exposure_s >= 0.0 && image.exposure_s < 1e4) ||
+      !(image.row_period_s >= 0.0 && image.row_period_s < 1.0) || !(image.gain > 0.0) ||
+      image.bits < 1 || image.bits > 16) {
+    return false;
+  }
+  const double open_s = image.exposure_s + image.row_period_s * (image.height - 1.0);
+  header->t_ns = image.exposure_begin_ns + nanoseconds(0.5 * open_s);
+  header->camera = {static_cast<int>(image.width),
+                    static_cast<int>(image.height),
+                    f[0],
+                    f[1],
+                    f[2],
+                    f[3],
+                    k[0],
+                    k[1],
+                    k[2],
+                    k[3],
+                    k[4]};
+  header->electrons_per_dn = image.gain;
+  header->saturation_dn = (1u << image.bits) - 1.0;
+  return true;
+}
+
 }  // namespace
 
 RpoKit::RpoKit(Outputs& outputs, const Configuration& configuration, const Boot& boot)
@@ -63,6 +101,18 @@ RpoKit::RpoKit(Outputs& outputs, const Configuration& configuration, const Boot&
       inspection_(configuration.inspection),
       approach_(configuration.approach) {
   novatel_framer_init(&framer_, gnss_room_, sizeof gnss_room_);
+  if (is_chaser() && *configuration_.star_catalogue != '\0') {
+    char message[160];
+    std::vector<Star> stars;
+    if (load_stars(configuration_.star_catalogue, &stars, message, sizeof message)) {
+      const ImagingOptions& imaging = configuration_.imaging;
+      frames_ = std::make_unique<FrameProcessor>(imaging, std::move(stars));
+      pixels_.resize(static_cast<std::size_t>(imaging.width) *
+                     static_cast<std::size_t>(imaging.height));
+    } else {
+      out_.log(LogLevel::kError, message);
+    }
+  }
   out_.out_mode(boot.now_ns, static_cast<std::uint32_t>(mode()));
   if (is_chaser()) {
     out_.request_tick(boot.now_ns + nanoseconds(configuration_.decision_period_s));
@@ -171,6 +221,71 @@ bool RpoKit::in_keypoints(const unsigned char* message, std::uint32_t bytes) {
   }
   if (inspection_.tracking()) send_target();
   return true;
+}
+
+bool RpoKit::in_image(const unsigned char* message, std::uint32_t bytes) {
+  orrery_image image;
+  if (frames_ == nullptr || orrery_get_image_header(message, bytes, &image) == 0) return reject();
+  const ImagingOptions& announced = configuration_.imaging;
+  if (image.width != static_cast<unsigned>(announced.width) ||
+      image.height != static_cast<unsigned>(announced.height) || image.rows == 0 ||
+      image.first_row + image.rows > image.height) {
+    return reject();
+  }
+  FrameHeader header;
+  if (!frame_header(image, &header)) return reject();
+  if (image.first_row == 0) {
+    frame_ = image.frame;
+    rows_in_ = 0;
+    frame_crc_ = 0;
+  }
+  if (image.frame != frame_ || image.first_row != rows_in_) return reject();
+  std::uint16_t* to = pixels_.data() + std::size_t{image.first_row} * image.width;
+  const unsigned char* from = message + ORRERY_IMAGE_HEADER_BYTES;
+  for (std::size_t k = 0; k < std::size_t{image.rows} * image.width; ++k) {
+    to[k] = static_cast<std::uint16_t>(orrery_get_u16(from + 2 * k));
+  }
+  rows_in_ += image.rows;
+  frame_crc_ = 31u * frame_crc_ + orrery_crc32(from, bytes - ORRERY_IMAGE_HEADER_BYTES);
+  if (rows_in_ < image.height) return true;
+  // A camera that has frozen sends old stars under a new time: noise never repeats itself.
+  if (frame_crc_ == last_frame_crc_) return reject();
+  last_frame_crc_ = frame_crc_;
+  hot_pixels_.mend(pixels_.data(), announced.width, announced.height);
+  look_at_frame(header);
+  return true;
+}
+
+// In ECI, from the estimate; it may be sigmas off, and near the target more than that.
+bool RpoKit::expected_target(std::int64_t t_ns, const Observer& own,
+                             ExpectedTarget* expected) const {
+  RelativeOrbit chaser;
+  Matrix6 covariance;
+  if (!navigation_.at(t_ns, &chaser, &covariance)) return false;
+  const Vec3 r_ECI = position_ECI(own.mean);
+  const Vec3 d = target_position_ECI(own.mean, r_ECI, relative_elements(own.mean, chaser.chief));
+  const Matrix6 H =
+      rtn_from_relative_elements(chaser.chief.u_rad, mean_motion_radps(chaser.chief.a_m));
+  const Matrix6 P = H * covariance * transpose(H);
+  expected->range_m = norm(d);
+  expected->direction_ECI = (1.0 / expected->range_m) * d;
+  // Across the line of sight, which is along the track.
+  const double across_m = std::sqrt(P(0, 0) + P(2, 2)) + configuration_.imaging.target_size_m;
+  expected->reach_rad = kLeastReach_rad + kReachSigmas * across_m / expected->range_m;
+  return true;
+}
+
+void RpoKit::look_at_frame(const FrameHeader& header) {
+  // Before the first fix of its own orbit it knows no RTN.
+  Observer own;
+  if (!navigation_.own_at(header.t_ns, &own)) return;
+  ExpectedTarget expected;
+  const bool known = expected_target(header.t_ns, own, &expected);
+  FrameReport report;
+  const ImageView view{pixels_.data(), configuration_.imaging.width, configuration_.imaging.height};
+  if (!frames_->process(header, view, own, known ? &expected : nullptr, &report)) return;
+  if (report.target) navigation_.bearing(report.bearing);
+  send_imaging(report);
 }
 
 void RpoKit::in_tick(std::int64_t now_ns) {
@@ -286,6 +401,32 @@ void RpoKit::send_estimate(const RelativeOrbit& now, const Matrix6& covariance) 
     e.sigma_v_mps[k] = std::sqrt(P(k + 3, k + 3));
   }
   out_.out_estimate(e);
+}
+
+void RpoKit::send_imaging(const FrameReport& report) {
+  rpo_kit_imaging r;
+  std::memset(&r, 0, sizeof r);
+  r.exposure_ns = report.t_ns;
+  r.sources = static_cast<std::uint32_t>(report.sources);
+  r.identified = static_cast<std::uint32_t>(report.identified);
+  if (report.lost_in_space) r.found |= RPO_KIT_FOUND_LOST;
+  if (report.attitude_known) {
+    r.found |= RPO_KIT_FOUND_ATTITUDE;
+    quaternion_of_matrix(report.attitude.R_CI, r.q_CI);
+    for (int k = 0; k < 3; ++k) {
+      r.attitude_sigma_rad[k] = std::sqrt(report.attitude.covariance_C(k, k));
+    }
+  }
+  if (report.target) {
+    r.found |= RPO_KIT_FOUND_TARGET;
+    for (int k = 0; k < 3; ++k) r.direction_ECI[k] = report.bearing.direction_ECI[k];
+    r.sigma_rad = report.bearing.sigma_rad;
+    r.u_px = report.pixel.u;
+    r.v_px = report.pixel.v;
+  }
+  unsigned char message[RPO_KIT_IMAGING_BYTES];
+  rpo_kit_put_imaging(message, &r);
+  out_.out_imaging(message, sizeof message);
 }
 
 void RpoKit::send_target() {

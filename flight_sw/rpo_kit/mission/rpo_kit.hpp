@@ -9,6 +9,8 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <vector>
 
 #include "formation_keeping/crosslink_protocol.hpp"
 #include "rpo_kit/mission/configuration.hpp"
@@ -34,6 +36,7 @@ class Outputs {
   virtual void out_mode(std::int64_t t_ns, std::uint32_t mode) = 0;
   virtual void out_estimate(const RelativeOutput& estimate) = 0;
   virtual void out_target(const unsigned char* message, std::uint32_t bytes) = 0;
+  virtual void out_imaging(const unsigned char* message, std::uint32_t bytes) = 0;
   virtual void out_telemetry(const unsigned char* packet, std::uint32_t bytes) = 0;
   /// Replaces the one before.
   virtual void request_tick(std::int64_t at_ns) = 0;
@@ -61,6 +64,9 @@ class RpoKit {
   bool in_bearing(const unsigned char* message, std::uint32_t bytes);
   bool in_pose(const PlaceMeasurement& place);
   bool in_keypoints(const unsigned char* message, std::uint32_t bytes);
+  /// A frame of the camera, or bands of its rows one after the other. Not usable: damaged, of
+  /// another size than announced, a band without the one before it, the same pixels once more.
+  bool in_image(const unsigned char* message, std::uint32_t bytes);
   void in_tick(std::int64_t now_ns);
 
   Mode mode() const { return autonomy_.mode(); }
@@ -84,6 +90,9 @@ class RpoKit {
   void command_burn(const flight_support::RelativeOrbit& now, const flight_support::Burn& burn);
   void send_estimate(const flight_support::RelativeOrbit& now,
                      const flight_support::Matrix6& covariance);
+  void look_at_frame(const FrameHeader& header);
+  bool expected_target(std::int64_t t_ns, const Observer& own, ExpectedTarget* expected) const;
+  void send_imaging(const FrameReport& report);
   void send_target();
   void send_telemetry(std::int64_t now_ns, const flight_support::RelativeOrbit* now,
                       const flight_support::Matrix6& covariance);
@@ -99,6 +108,11 @@ class RpoKit {
   Inspection inspection_;
   Approach approach_;
   Autonomy autonomy_;
+  std::unique_ptr<FrameProcessor> frames_;  // null: no camera
+  HotPixels hot_pixels_;
+  std::vector<std::uint16_t> pixels_;  // of the frame that is coming in
+  std::uint32_t frame_ = 0, frame_crc_ = 0, last_frame_crc_ = 0;
+  unsigned rows_in_ = 0;
   std::int64_t last_crosslink_slot_ = -1, last_telemetry_slot_ = -1;
   double delta_v_mps_ = 0.0;
   std::uint32_t burns_ = 0, rejected_ = 0;

@@ -33,6 +33,10 @@ struct Bus : Outputs {
   void out_target(const unsigned char* message, std::uint32_t bytes) override {
     EXPECT_EQ(rpo_kit_get_target(message, bytes, &target), 1);
   }
+  void out_imaging(const unsigned char* message, std::uint32_t bytes) override {
+    EXPECT_EQ(rpo_kit_get_imaging(message, bytes, &imaging), 1);
+    ++frames;
+  }
   void out_telemetry(const unsigned char* packet, std::uint32_t bytes) override {
     EXPECT_EQ(rpo_kit_get_telemetry(packet, bytes, &telemetry), 1);
   }
@@ -50,6 +54,8 @@ struct Bus : Outputs {
   RelativeOutput estimate;
   rpo_kit_telemetry telemetry = {};
   rpo_kit_target target = {};
+  rpo_kit_imaging imaging = {};
+  int frames = 0;
   std::int64_t tick_ns = -1;
   std::vector<std::string> complaints;
   bool refuse = false;
@@ -162,6 +168,89 @@ TEST(RpoKitTest, UnusableInputsAreRejectedAndCounted) {
   EXPECT_EQ(quiet.tick_ns, -1);
 }
 
+// What a camera of 64 x 64 px sends: a band of one frame, all of its pixels alike.
+std::vector<unsigned char> band(std::uint32_t frame, unsigned first_row, unsigned rows) {
+  orrery_image image = {};
+  image.frame = frame;
+  image.width = image.height = 64;
+  image.first_row = first_row;
+  image.rows = rows;
+  image.bits = 12;
+  image.exposure_begin_ns = kEpoch_ns + frame * kSecond_ns;
+  image.exposure_s = 0.2;
+  image.row_period_s = 1e-3;
+  image.gain = 4.0;
+  for (double& f : image.fx_fy_cx_cy) f = 30.0;
+  std::vector<unsigned char> message(ORRERY_IMAGE_HEADER_BYTES + 2 * 64 * rows,
+                                     static_cast<unsigned char>(frame));
+  orrery_put_image_header(message.data(), &image);
+  return message;
+}
+
+TEST(RpoKitTest, FramesComeWholeOrInBands) {
+  const std::string path = testing::TempDir() + "rpo_kit_test_stars.txt";
+  std::FILE* file = std::fopen(path.c_str(), "w");
+  std::fputs("0 0 1\n10 0 1\n0 10 1\n10 10 1\n", file);
+  std::fclose(file);
+  const std::string text =
+      "role = chaser\nimage_width_px = 64\nimage_height_px = 64\n"
+      "camera_f_px = 30\nstar_catalogue = " +
+      path + "\n";
+  Bus bus;
+  RpoKit chaser(bus, configured(text.c_str()), {kEpoch_ns, 0});
+  std::remove(path.c_str());
+  EXPECT_TRUE(bus.complaints.empty());
+  const auto give_band = [&](const std::vector<unsigned char>& message) {
+    return chaser.in_image(message.data(), static_cast<std::uint32_t>(message.size()));
+  };
+  EXPECT_TRUE(give_band(band(1, 0, 64)));
+  EXPECT_EQ(bus.frames, 0);  // it does not know where it is
+  Noise noise(5);
+  const StateEci state = flight_test::state_of_mean(flight_test::reference_chief());
+  const auto own = flight_test::bestxyz_frame(flight_test::noisy_fix(kEpoch_ns, state, &noise));
+  ASSERT_TRUE(chaser.in_gnss(kEpoch_ns, own.data(), static_cast<std::uint32_t>(own.size())));
+  chaser.in_tick(kEpoch_ns + 40 * kSecond_ns);
+  EXPECT_TRUE(give_band(band(2, 0, 64)));
+  EXPECT_EQ(bus.frames, 1);
+  // Middle of the exposure: half of 0.2 s and of 63 rows of 1 ms.
+  EXPECT_EQ(bus.imaging.exposure_ns, kEpoch_ns + 2 * kSecond_ns + 131500000);
+  EXPECT_EQ(bus.imaging.found, static_cast<std::uint32_t>(RPO_KIT_FOUND_LOST));
+  EXPECT_TRUE(give_band(band(3, 0, 40)));
+  EXPECT_TRUE(give_band(band(3, 40, 20)));
+  EXPECT_EQ(bus.frames, 1);
+  EXPECT_TRUE(give_band(band(3, 60, 4)));
+  EXPECT_EQ(bus.frames, 2);
+  // The pixels of the frame before, in the same bands.
+  EXPECT_TRUE(give_band(band(3, 0, 40)));
+  EXPECT_TRUE(give_band(band(3, 40, 20)));
+  EXPECT_FALSE(give_band(band(3, 60, 4)));
+  EXPECT_EQ(bus.frames, 2);
+  // A band that is missing, one of another frame, one more, none, a wrong size, a wrong length.
+  EXPECT_TRUE(give_band(band(4, 0, 20)));
+  EXPECT_FALSE(give_band(band(4, 40, 24)));
+  EXPECT_FALSE(give_band(band(5, 20, 44)));
+  EXPECT_FALSE(give_band(band(3, 60, 4)));
+  EXPECT_FALSE(give_band(band(6, 0, 0)));
+  std::vector<unsigned char> message = band(6, 0, 64);
+  message.pop_back();
+  EXPECT_FALSE(give_band(message));
+  message = band(6, 0, 32);
+  orrery_put_u16(message.data() + 4, 32);
+  orrery_put_u16(message.data() + 10, 64);
+  EXPECT_FALSE(give_band(message));
+  message = band(6, 0, 64);
+  orrery_put_f64(message.data() + 56, std::nan(""));
+  EXPECT_FALSE(give_band(message));
+  EXPECT_EQ(bus.frames, 2);
+  chaser.in_tick(kEpoch_ns + 100 * kSecond_ns);
+  EXPECT_EQ(bus.telemetry.rejected, 8u);
+
+  Bus blind;
+  RpoKit other(blind, configured("role = chaser\n"), {kEpoch_ns, 0});
+  const std::vector<unsigned char> whole = band(1, 0, 64);
+  EXPECT_FALSE(other.in_image(whole.data(), static_cast<std::uint32_t>(whole.size())));
+}
+
 TEST(RpoKitConfigurationTest, WrongTextIsNamed) {
   const auto complaint = [](const char* text) {
     Configuration configuration;
@@ -172,6 +261,9 @@ TEST(RpoKitConfigurationTest, WrongTextIsNamed) {
   };
   EXPECT_EQ(complaint("role = chaser\nkeep_out = 5\n"),
             "configuration line 2: 'keep_out' is no key of this package");
+  EXPECT_NE(complaint("star_catalogue = /stars\n").find("needs image_width_px"), std::string::npos);
+  EXPECT_NE(complaint("star_catalogue =\n").find("is no path"), std::string::npos);
+  EXPECT_NE(complaint("image_width_px = 64.5\n").find("is no integer"), std::string::npos);
   EXPECT_EQ(complaint("role = chief\n"), "configuration line 1: 'role' is not target or chaser");
   EXPECT_NE(complaint("lost_s = 5\n").find("[60, 1e+06]"), std::string::npos);
   EXPECT_NE(complaint("waypoint = -100 20 3\n").find("lacks a number"), std::string::npos);
