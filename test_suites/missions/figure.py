@@ -59,7 +59,11 @@ class Axes:
         low, high = limits
         if log:
             first, last = math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9)
-            return [10.0 ** k for k in range(first, last + 1)]
+            if last - first >= 2:
+                return [10.0 ** k for k in range(first, last + 1)]
+            # Too few powers of ten to read a value by: 1, 2 and 5 of each decade.
+            ticks = [k * 10.0 ** power for power in range(first - 1, last + 1) for k in (1, 2, 5)]
+            return [t for t in ticks if low * (1 - 1e-9) <= t <= high * (1 + 1e-9)]
         step = step or nice_step(high - low, most)
         return [k * step for k in range(math.ceil(low / step - 1e-9),
                                         math.floor(high / step + 1e-9) + 1)]
