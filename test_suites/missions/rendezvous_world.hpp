@@ -14,6 +14,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
 #include <memory>
 #include <string>
 #include <utility>
@@ -300,7 +301,9 @@ struct RendezvousOptions {
   bool directions = true, keypoints = true;
   DirectionOptions direction = {};
   KeypointOptions keypoint = {};
-  bool cooperative = true;  // false: no word of the target's GNSS
+  bool cooperative = true;                        // false: no word of the target's GNSS
+  std::uint64_t heap_bytes = 1_MB;                // cap of each flight process
+  std::map<std::string, std::string> files = {};  // that flight software finds
   std::optional<RunId> run = {};
 };
 
@@ -381,7 +384,9 @@ struct RendezvousWorld : FormationWorld {
         .chief_name = "target",
         .deputy_name = "chaser",
         .roe_m = options.roe_m,
-        .flight = {.library = options.library, .heap_bytes = 1_MB},
+        .flight = {.library = options.library,
+                   .files = options.files,
+                   .heap_bytes = options.heap_bytes},
         .chief_config = "role = target\n",
         .deputy_config =
             "role = chaser\nburn_error_fraction = " + std::to_string(options.burn_fraction) +
