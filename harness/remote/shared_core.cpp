@@ -12,20 +12,25 @@ std::shared_ptr<SharedCore> SharedCore::of_this_thread() {
 
 SharedCore::SharedCore() : tid_(gettid()) {}
 
+void SharedCore::hold() {
+  const std::lock_guard lock(mutex_);
+  if (children_.empty() && sched_getaffinity(0, sizeof home_, &home_) != 0) return;
+  if (CPU_COUNT(&home_) < 2) return;
+  stay();
+  loose_ = false;
+  for (const pid_t child : children_) sched_setaffinity(child, sizeof core_, &core_);
+  next_ns_ = 0;
+}
+
 void SharedCore::join(pid_t child) {
   const std::lock_guard lock(mutex_);
-  if (children_.empty()) {
-    if (sched_getaffinity(0, sizeof home_, &home_) != 0 || CPU_COUNT(&home_) < 2) return;
-    stay();
-    next_ns_ = 0;
-  }
-  children_.push_back(child);
-  sched_setaffinity(child, sizeof core_, &core_);
+  if (next_ns_ != INT64_MAX) children_.push_back(child);
 }
 
 void SharedCore::leave(pid_t child) {
   const std::lock_guard lock(mutex_);
-  if (std::erase(children_, child) > 0 && children_.empty()) let_go();
+  std::erase(children_, child);
+  if (children_.empty() && next_ns_ != INT64_MAX) let_go();
 }
 
 void SharedCore::choose(std::int64_t host_now_ns) {

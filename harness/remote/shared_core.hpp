@@ -3,6 +3,7 @@
 
 #include <orrery/harness/kernel/simulator_only.hpp>
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -28,9 +29,13 @@ class SharedCore {
   SharedCore(const SharedCore&) = delete;
   SharedCore& operator=(const SharedCore&) = delete;
 
-  /// Started a moment ago by this thread.
+  /// Before a child is started, which inherits the core: set later it might undo a choice of its
+  /// own.
+  void hold();
+  /// Started by this thread since hold().
   void join(pid_t child);
-  /// Before it is waited for. The last one gives the thread its cores back. Any thread.
+  /// Before it is waited for; -1: none was started. The last one gives the thread its cores back.
+  /// Any thread.
   void leave(pid_t child);
   /// Before each exchange. In another thread it does nothing.
   void take_turn(std::int64_t host_now_ns) {
@@ -49,7 +54,7 @@ class SharedCore {
   cpu_set_t home_{};  // of the thread, before
   cpu_set_t core_{};  // where they are
   bool loose_ = false;
-  std::int64_t next_ns_ = INT64_MAX;
+  std::atomic<std::int64_t> next_ns_{INT64_MAX};  // INT64_MAX: the thread is free
 };
 
 }  // namespace orrery

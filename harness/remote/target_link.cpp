@@ -252,13 +252,17 @@ TargetLink::TargetLink(const TargetAddress& address, Duration patience) : Target
   const Pipe answers = make_pipe(address);
   in_ = answers.read_end;
   fcntl(out_, F_SETFL, fcntl(out_, F_GETFL) | O_NONBLOCK);
+  core_ = SharedCore::of_this_thread();
+  core_->hold();
   const pid_t child = start(address, requests, answers);
-  if (child < 0) cannot_reach(address, system_error(-child));
+  if (child < 0) {
+    core_->leave(-1);
+    cannot_reach(address, system_error(-child));
+  }
   child_ = child;
+  core_->join(child_);
   watch_ = Watch::over(in_, patience);
   if (watch_ == nullptr) fcntl(in_, F_SETFL, fcntl(in_, F_GETFL) | O_NONBLOCK);
-  core_ = SharedCore::of_this_thread();
-  core_->join(child_);
   begin_exchange();
 }
 
