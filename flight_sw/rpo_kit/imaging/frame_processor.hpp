@@ -29,9 +29,12 @@ struct ImagingOptions {
   DetectionOptions detection = {};
   IdentificationOptions identification = {};  ///< field_radius_rad is taken from above
   TrackerOptions tracker = {};
-  double pair_magnitude = 5.3;   ///< fainter stars are in no pair
-  int most_stars = 60;           ///< sources that are looked at as stars, the brightest
-  double pointing_rad = 0.003;   ///< by which the camera may turn in RTN between two frames
+  double pair_magnitude = 5.3;  ///< fainter stars are in no pair
+  int most_stars = 60;          ///< sources that are looked at as stars, the brightest
+  double pointing_rad = 0.003;  ///< by which the camera may turn in RTN between two frames
+  /// What the orbits' model leaves of a direction, 1-sigma per axis: neighbouring orbits share most
+  /// of what it lacks, so it goes with the distance. Added to what navigation is told.
+  double model_rad = 3e-5;
   double target_size_m = 0.1;    ///< 1-sigma of where its light comes from
   double systematic_rad = 5e-6;  ///< of a direction, 1-sigma per axis
   double blend_px = 6.0;         ///< nearer to a star of the catalogue, no direction is given

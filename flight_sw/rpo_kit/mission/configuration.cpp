@@ -51,6 +51,7 @@ class Reader final : public flight_support::ConfigurationReader {
         {"psf_sigma_px", &c.imaging.detection.psf_sigma_px, 0.3, 5.0},
         {"pair_magnitude", &c.imaging.pair_magnitude, -2.0, 20.0},
         {"target_size_m", &c.imaging.target_size_m, 0.0, 100.0},
+        {"model_rad", &c.imaging.model_rad, 0.0, 1e-2},
         {"pointing_rad", &c.imaging.pointing_rad, 1e-5, 0.1},
     };
     for (std::size_t k = 0; k < sizeof keys / sizeof keys[0]; ++k) {

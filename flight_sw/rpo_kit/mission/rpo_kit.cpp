@@ -284,7 +284,11 @@ void RpoKit::look_at_frame(const FrameHeader& header) {
   FrameReport report;
   const ImageView view{pixels_.data(), configuration_.imaging.width, configuration_.imaging.height};
   if (!frames_->process(header, view, own, known ? &expected : nullptr, &report)) return;
-  if (report.target) navigation_.bearing(report.bearing);
+  if (report.target) {
+    Bearing bearing = report.bearing;
+    bearing.sigma_rad = std::hypot(bearing.sigma_rad, configuration_.imaging.model_rad);
+    navigation_.bearing(bearing);
+  }
   send_imaging(report);
 }
 
