@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <sched.h>
 #include <unistd.h>
 
 namespace orrery {
@@ -26,6 +27,14 @@ class SignalsBlocked {
  private:
   sigset_t before_;
 };
+
+// Of the program as it was started: a thread may keep to one of them since (SharedCore).
+const cpu_set_t kCores = [] {
+  cpu_set_t cores;
+  CPU_ZERO(&cores);
+  sched_getaffinity(0, sizeof cores, &cores);
+  return cores;
+}();
 
 }  // namespace
 
@@ -96,7 +105,10 @@ void CallQueue::hand_over() {
   if (!thread_.joinable()) {
     const SignalsBlocked blocked;
     process_ = getpid();
-    thread_ = std::thread([this] { make_calls(); });
+    thread_ = std::thread([this] {
+      sched_setaffinity(0, sizeof kCores, &kCores);
+      make_calls();
+    });
   }
   {
     const std::lock_guard lock(mutex_);

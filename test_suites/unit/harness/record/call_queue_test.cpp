@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <sched.h>
 #include <stdexcept>
 #include <string>
 #include <sys/wait.h>
@@ -31,6 +32,7 @@ struct Listener {
     if (!bytes.empty()) last_byte = bytes.back();
   }
   void nothing() { thread = std::this_thread::get_id(); }
+  void count_cores() { sched_getaffinity(0, sizeof cores, &cores); }
   void refuse_from(int n, int last) {
     if (n >= last) throw std::runtime_error("refused " + std::to_string(n));
     numbers.push_back(n);
@@ -44,6 +46,7 @@ struct Listener {
   std::vector<std::string> lines;
   std::byte last_byte{};
   std::thread::id thread;
+  cpu_set_t cores{};
 };
 
 // More than all blocks hold at once: 400,000 calls of 32 bytes are 12.8 MB.
@@ -81,6 +84,20 @@ TEST(CallQueueTest, AnotherThreadMakesTheCalls) {
   queue.finish();
   EXPECT_NE(listener.thread, std::thread::id());
   EXPECT_NE(listener.thread, std::this_thread::get_id());
+}
+
+TEST(CallQueueTest, TheOtherThreadRunsAnywhereThoughThisOneKeepsToACore) {
+  cpu_set_t before, one;
+  ASSERT_EQ(sched_getaffinity(0, sizeof before, &before), 0);
+  CPU_ZERO(&one);
+  CPU_SET(sched_getcpu(), &one);
+  ASSERT_EQ(sched_setaffinity(0, sizeof one, &one), 0);
+  Listener listener;
+  CallQueue queue;
+  queue.put(listener, &Listener::count_cores);
+  queue.finish();
+  sched_setaffinity(0, sizeof before, &before);
+  EXPECT_TRUE(CPU_EQUAL(&listener.cores, &before));
 }
 
 TEST(CallQueueTest, WhatIsLeftIsDoneBeforeItGoes) {
