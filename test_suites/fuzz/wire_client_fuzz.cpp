@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cstring>
-#include <orrery_crc32_sliced.h>
 #include <orrery_messages.h>
 #include <orrery_wire.h>
 #include <sys/socket.h>
@@ -17,26 +16,10 @@
 #include <vector>
 
 #include "fuzz_check.hpp"
+#include "wire_bytes.hpp"
 
 namespace orrery {
 namespace {
-
-using Buffer = std::vector<unsigned char>;
-
-std::uint32_t crc32(const unsigned char* data, std::size_t bytes) {
-  static const orrery_crc32_tables tables = [] {
-    orrery_crc32_tables filled;
-    orrery_crc32_fill(&filled);
-    return filled;
-  }();
-  return orrery_crc32_sliced(&tables, data, bytes);
-}
-
-void append_u32(Buffer& to, std::uint32_t value) {
-  unsigned char bytes[4];
-  orrery_put_u32(bytes, value);
-  to.insert(to.end(), bytes, bytes + 4);
-}
 
 void append_frame(Buffer& to, unsigned type, std::uint32_t sequence, std::uint32_t code,
                   unsigned damage, const std::uint8_t* payload, std::uint32_t bytes) {
@@ -108,7 +91,7 @@ void fly(int socket) {
 }  // namespace orrery
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const orrery::Buffer answers = orrery::answers_of(data, size);
+  const Buffer answers = orrery::answers_of(data, size);
   int ends[2];
   if (answers.size() > 60'000 || socketpair(AF_UNIX, SOCK_STREAM, 0, ends) != 0) return 0;
   orrery::fuzz_check(

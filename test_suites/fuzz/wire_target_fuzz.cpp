@@ -7,16 +7,15 @@
 #include <algorithm>
 #include <cstring>
 #include <memory>
-#include <orrery_crc32_sliced.h>
 #include <orrery_wire.h>
 #include <vector>
 
 #include "fuzz_check.hpp"
+#include "wire_bytes.hpp"
 
 namespace {
 
 using orrery::fuzz_check;
-using Buffer = std::vector<unsigned char>;
 
 struct Wire {
   Buffer requests;
@@ -84,21 +83,6 @@ std::int32_t write(void* context, const void* data, std::uint32_t bytes) {
   const auto* begin = static_cast<const unsigned char*>(data);
   wire.answers.insert(wire.answers.end(), begin, begin + bytes);
   return 0;
-}
-
-std::uint32_t crc32(const unsigned char* data, std::size_t bytes) {
-  static const orrery_crc32_tables tables = [] {
-    orrery_crc32_tables filled;
-    orrery_crc32_fill(&filled);
-    return filled;
-  }();
-  return orrery_crc32_sliced(&tables, data, bytes);
-}
-
-void append_u32(Buffer& to, std::uint32_t value) {
-  unsigned char bytes[4];
-  orrery_put_u32(bytes, value);
-  to.insert(to.end(), bytes, bytes + 4);
 }
 
 void append_request(Buffer& to, std::uint32_t sequence, unsigned type, unsigned damage,
