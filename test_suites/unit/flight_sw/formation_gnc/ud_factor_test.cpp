@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 
 #include "formation_gnc/navigation/orbit_pair.hpp"
 
@@ -158,6 +159,69 @@ TEST(UdFactorTest, StaysPositiveThroughMeasurementsThatAreFarTooGood) {
     for (int j = 0; j < kStates; ++j) {
       ASSERT_GT(ud.d(j), 0.0) << k;
       ASSERT_TRUE(std::isfinite(ud.d(j)) && std::isfinite(gain[j])) << k;
+    }
+  }
+}
+
+// A factor as UdFactor stores it, in arrays, so that a path of the loops can be chosen.
+struct Stored {
+  double U[ud_kernel::offset(kStates)] = {}, D[kStates], b[kStates] = {};
+  ud_kernel::Weighted w;
+
+  explicit Stored(orrery::RandomStream* random) {
+    for (int j = 0; j < kStates; ++j) {
+      for (int i = 0; i < j; ++i) U[ud_kernel::offset(j) + i] = random->uniform(-1, 1);
+      U[ud_kernel::offset(j) + j] = 1.0;
+      D[j] = random->uniform(0.1, 2.0);
+    }
+    for (double& weight : w.weight) weight = random->uniform(0.1, 2.0);
+    for (int k = 0; k < ud_kernel::kRows; ++k) {
+      const int width = k < ud_kernel::kUpper ? ud_kernel::kWide : ud_kernel::kHalf;
+      for (int i = 0; i < ud_kernel::kWide; ++i) {
+        w.row[k][i] = i < width ? random->uniform(-1, 1) : 0.0;
+      }
+    }
+  }
+};
+
+// Everything once: by one path and by the other.
+void do_all(const ud_kernel::Loops& loops, const SparseRow& h, const Column& g, Stored* s) {
+  double f[kStates];
+  const double variance = loops.project(kStates, s->U, s->D, {h.count, h.state, h.value}, f);
+  const double inverse = loops.measure(kStates, s->U, s->D, f, 0.3, s->b);
+  EXPECT_NEAR(inverse * (variance + 0.3), 1.0, kTolerance);
+  Column x = g;
+  loops.add(s->U, s->D, 0.7, x.data(), kStates - 1);
+  loops.refactor(s->U, s->D, kPositionSelf, &s->w);
+}
+
+#if defined(__x86_64__)
+TEST(UdFactorTest, BothWidthsOfRegisterGiveTheSameBits) {
+  if (!__builtin_cpu_supports("avx2")) GTEST_SKIP() << "this processor has no AVX2";
+  orrery::RandomStream random(6);
+  for (int k = 0; k < 50; ++k) {
+    const Stored start(&random);
+    const SparseRow h = random_row(&random);
+    const Column g = random_column(&random, kStates - 1);
+    Stored plain = start, wide = start;
+    do_all(ud_kernel::kPlain, h, g, &plain);
+    do_all(ud_kernel::kAvx2, h, g, &wide);
+    ASSERT_EQ(std::memcmp(&plain, &wide, sizeof plain), 0) << k;
+    ASSERT_NE(std::memcmp(&plain, &start, sizeof plain), 0) << k;
+  }
+}
+#endif
+
+// Every loop takes a diagonal of ones and zeros below it for granted, and keeps them.
+TEST(UdFactorTest, BelowTheDiagonalNothingIsEverStored) {
+  orrery::RandomStream random(7);
+  Stored s(&random);
+  for (int k = 0; k < 20; ++k) {
+    do_all(ud_kernel::kPlain, random_row(&random), random_column(&random, kStates - 1), &s);
+  }
+  for (int j = 0; j < kStates; ++j) {
+    for (int i = j; i < ud_kernel::rows(j); ++i) {
+      EXPECT_EQ(s.U[ud_kernel::offset(j) + i], i == j ? 1.0 : 0.0) << i << ' ' << j;
     }
   }
 }
