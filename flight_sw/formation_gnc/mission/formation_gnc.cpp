@@ -90,6 +90,15 @@ Maneuver maneuver_of(const Impulse& expected, const Vec3& expected_B, const Mat3
   return m;
 }
 
+// As the filter adds it, by axis of the body.
+Vec3 variances(const Maneuver& m, const Vec3& dv_B) {
+  const double size2 = dot(dv_B, dv_B);
+  const double along = size2 > 0.0 ? m.more_along_mps * m.more_along_mps / size2 : 0.0;
+  Vec3 of;
+  for (int k = 0; k < 3; ++k) of[k] = m.sigma_mps * m.sigma_mps + along * dv_B[k] * dv_B[k];
+  return of;
+}
+
 double trace_of_position(const Matrix6& P) {
   return P(0, 0) + P(1, 1) + P(2, 2);
 }
@@ -463,7 +472,7 @@ void FormationGnc::command_burn(const Impulse& wanted) {
   const Mat3 P_B = scale_.covariance(commanded_B);
   const Maneuver maneuver = maneuver_of(expected, expected_B, P_B);
   navigation_.maneuver(maneuver);
-  watch_burn(expected, R_BI, commanded_B, P_B);
+  watch_burn(maneuver, R_BI, commanded_B);
   Payload notice;
   ByteWriter writer(notice.data, sizeof notice.data);
   writer.u8(kManeuverNotice);
@@ -483,18 +492,17 @@ void FormationGnc::command_burn(const Impulse& wanted) {
 
 // ---- the thruster's scale: velocity predicted with the burn, against what navigation finds later
 
-void FormationGnc::watch_burn(const Impulse& expected, const Mat3& R_BI, const Vec3& commanded_B,
-                              const Mat3& P_B) {
+void FormationGnc::watch_burn(const Maneuver& burn, const Mat3& R_BI, const Vec3& commanded_B) {
   if (watched_.waiting) return;
-  watched_.look_ns = expected.t_ns + nanoseconds(kScaleLook_s);
+  watched_.look_ns = burn.t_ns + nanoseconds(kScaleLook_s);
   const FormationEstimate predicted = navigation_.at(watched_.look_ns);
   watched_.waiting = predicted.valid;
-  watched_.expected_B = R_BI * expected.dv_ECI;
+  watched_.expected_B = R_BI * burn.dv_ECI;
   watched_.commanded_B = commanded_B;
   watched_.R_BI = R_BI;
   watched_.predicted_v = predicted.v_relative_ECI;
   watched_.predicted_variance_B = velocity_variances(predicted, R_BI);
-  watched_.of_burn_B = vec3(P_B(0, 0), P_B(1, 1), P_B(2, 2));
+  watched_.of_burn_B = variances(burn, watched_.expected_B);
 }
 
 void FormationGnc::learn_scale(std::int64_t now_ns) {

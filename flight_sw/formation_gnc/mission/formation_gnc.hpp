@@ -104,7 +104,7 @@ class FormationGnc {
     flight_support::Vec3 predicted_v;           // of other less self, ECI
     flight_support::Mat3 R_BI;                  // in the middle of the burn
     flight_support::Vec3 predicted_variance_B;  // of that velocity, burn included
-    flight_support::Vec3 of_burn_B;             // variance of its execution
+    flight_support::Vec3 of_burn_B;             // variance of its execution, as the filter has it
   };
 
   bool is_deputy() const { return configuration_.role == Role::kDeputy; }
@@ -129,8 +129,8 @@ class FormationGnc {
   void place_observation(const FormationEstimate& estimate);
   void maneuver(const FormationEstimate& estimate);
   void command_burn(const Impulse& wanted);
-  void watch_burn(const Impulse& expected, const flight_support::Mat3& R_BI,
-                  const flight_support::Vec3& commanded_B, const flight_support::Mat3& P_B);
+  void watch_burn(const Maneuver& burn, const flight_support::Mat3& R_BI,
+                  const flight_support::Vec3& commanded_B);
   void learn_scale(std::int64_t now_ns);
   void send_due(std::int64_t now_ns);
   void schedule(std::int64_t now_ns, std::int64_t now_onboard_ns);
