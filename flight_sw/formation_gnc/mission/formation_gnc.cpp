@@ -27,7 +27,6 @@ constexpr std::int64_t kHousekeeping_ns = 60 * kNs;
 constexpr std::int64_t kRetry_ns = kNs;
 constexpr std::uint32_t kChunk = 512;  // of the receiver's stream at a time
 constexpr int kUnsafeForecasts = 3;    // in a row, before an escape
-constexpr double kScaleLook_s = 90.0;  // after a burn
 
 std::int64_t nanoseconds(double seconds) {
   return static_cast<std::int64_t>(seconds * 1e9);
@@ -65,54 +64,8 @@ Vec3 vec3_of(const double* v) {
   return vec3(v[0], v[1], v[2]);
 }
 
-// Of the relative velocity in ECI, along the axes of the body. In the turning frame it would have
-// the error of the position in it.
-Vec3 velocity_variances(const FormationEstimate& e, const Mat3& R_BI) {
-  Mat3 P;
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) P(r, c) = e.covariance(9 + r, 9 + c);
-  }
-  P = R_BI * P * transpose(R_BI);
-  return vec3(P(0, 0), P(1, 1), P(2, 2));
-}
-
-// What is alike in all axes across the burn, and what is more along it.
-Maneuver maneuver_of(const Impulse& expected, const Vec3& expected_B, const Mat3& P_B) {
-  Maneuver m;
-  m.who = Who::kSelf;
-  m.t_ns = expected.t_ns;
-  m.dv_ECI = expected.dv_ECI;
-  const double trace = P_B(0, 0) + P_B(1, 1) + P_B(2, 2), size2 = dot(expected_B, expected_B);
-  const double along2 = size2 > 0.0 ? dot(expected_B, P_B * expected_B) / size2 : trace / 3.0;
-  const double across2 = std::min(0.5 * (trace - along2), trace / 3.0);
-  m.sigma_mps = std::sqrt(across2);
-  m.more_along_mps = std::sqrt(std::max(0.0, along2 - across2));
-  return m;
-}
-
-// As the filter adds it, by axis of the body.
-Vec3 variances(const Maneuver& m, const Vec3& dv_B) {
-  const double size2 = dot(dv_B, dv_B);
-  const double along = size2 > 0.0 ? m.more_along_mps * m.more_along_mps / size2 : 0.0;
-  Vec3 of;
-  for (int k = 0; k < 3; ++k) of[k] = m.sigma_mps * m.sigma_mps + along * dv_B[k] * dv_B[k];
-  return of;
-}
-
 double trace_of_position(const Matrix6& P) {
   return P(0, 0) + P(1, 1) + P(2, 2);
-}
-
-// The turn of q by omega_B over dt, of a body whose rate is constant.
-Quaternion turned(const Quaternion& q, const double omega_B[3], double dt_s) {
-  const double rate = norm(vec3_of(omega_B));
-  const double half = 0.5 * rate * dt_s;
-  const double k = rate > 0.0 ? std::sin(half) / rate : 0.0;
-  // q_BI turns components from ECI to body, so the turn of the body comes with the opposite sign.
-  const Quaternion d{std::cos(half), -k * omega_B[0], -k * omega_B[1], -k * omega_B[2]};
-  return {
-      d.w * q.w - d.x * q.x - d.y * q.y - d.z * q.z, d.w * q.x + d.x * q.w + d.y * q.z - d.z * q.y,
-      d.w * q.y - d.x * q.z + d.y * q.w + d.z * q.x, d.w * q.z + d.x * q.y - d.y * q.x + d.z * q.w};
 }
 
 }  // namespace
@@ -128,7 +81,7 @@ FormationGnc::FormationGnc(Outputs& outputs, const Configuration& configuration,
                loaded_record(outputs, configuration.initial_mode), loaded_plan(outputs),
                boot.now_ns),
       maneuvers_(gravity_, configuration.maneuvers),
-      scale_(configuration.maneuvers.errors),
+      burn_observer_(configuration.maneuvers.errors),
       delta_v_mps_(loaded_delta_v(outputs)) {
   maneuvers_.enter(mission_.protocol().record().current);
   ask_receiver(boot.now_ns);
@@ -183,9 +136,7 @@ bool FormationGnc::in_bus(std::int64_t, const unsigned char* message, std::uint3
   const double length2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
   // Written so that a NaN is rejected.
   if (!(std::fabs(length2 - 1.0) < 1e-3) || !(norm(vec3_of(omega)) < 10.0)) return reject();
-  attitude_.t_ns = clock_.gps_ns(t_ns);
-  attitude_.q_BI = {q[0], q[1], q[2], q[3]};
-  std::copy(omega, omega + 3, attitude_.omega_B);
+  attitude_.take(clock_.gps_ns(t_ns), {q[0], q[1], q[2], q[3]}, vec3_of(omega));
   return true;
 }
 
@@ -286,8 +237,8 @@ void FormationGnc::handle_epoch(const GnssEpoch& epoch, std::int64_t now_onboard
   last_epoch_ns_ = epoch.t_ns;
   const std::int64_t now_ns = clock_.gps_ns(now_onboard_ns);
   if (epoch.count > 0) last_range_ns_ = epoch.t_ns;
-  if (attitude_.t_ns != 0) {
-    const Quaternion q_BI = attitude_at(epoch.t_ns);
+  if (attitude_.known()) {
+    const Quaternion q_BI = attitude_.at(epoch.t_ns);
     navigation_.own_epoch(epoch, q_BI);
     if (navigation_.reports().t_ns == epoch.t_ns) graphic_.add(navigation_.reports().graphic_self);
     // Slots are counted in GPS time, so that both send the same epochs.
@@ -306,12 +257,6 @@ void FormationGnc::handle_epoch(const GnssEpoch& epoch, std::int64_t now_onboard
     send_telemetry(now_ns, estimate);
   }
   work(now_onboard_ns, estimate.valid ? &estimate : nullptr);
-}
-
-Quaternion FormationGnc::attitude_at(std::int64_t t_ns) const {
-  const double dt_s = 1e-9 * static_cast<double>(t_ns - attitude_.t_ns);
-  // The bus speaks every second; older than some minutes a rate says nothing.
-  return std::fabs(dt_s) < 300.0 ? turned(attitude_.q_BI, attitude_.omega_B, dt_s) : attitude_.q_BI;
 }
 
 void FormationGnc::send_measurement(const GnssEpoch& epoch, const Quaternion& q_BI) {
@@ -352,7 +297,7 @@ void FormationGnc::work(std::int64_t now_onboard_ns, const FormationEstimate* es
   mission_.poll(now_ns, &crosslink_.link());
   settle(now_ns);
   if (is_deputy() && estimate != nullptr) maneuver(*estimate);
-  learn_scale(now_ns);
+  burn_observer_.learn(now_ns, navigation_);
   send_due(now_onboard_ns);
   schedule(now_ns, now_onboard_ns);
 }
@@ -450,17 +395,16 @@ void FormationGnc::maneuver(const FormationEstimate& estimate) {
 }
 
 void FormationGnc::command_burn(const Impulse& wanted) {
-  const Mat3 R_BI = rotation_of(attitude_at(wanted.t_ns));
+  const Mat3 R_BI = rotation_of(attitude_.at(wanted.t_ns));
   const ManeuverOptions& options = configuration_.maneuvers;
   // Already as the thruster will round it, so that the filters hear of what is really done.
-  const Vec3 commanded_B =
-      in_whole_on_times(scale_.command_for(R_BI * wanted.dv_ECI), options.limits, options.errors);
+  const Vec3 commanded_B = in_whole_on_times(
+      burn_observer_.scale().command_for(R_BI * wanted.dv_ECI), options.limits, options.errors);
   if (!(norm(commanded_B) > 0.0)) {  // less than half of the smallest, in each axis
     maneuvers_.commanded(wanted, false);
     return;
   }
-  const Vec3 commanded = transpose(R_BI) * commanded_B, expected_B = scale_.delivered(commanded_B);
-  const Impulse expected{wanted.t_ns, transpose(R_BI) * expected_B};
+  const Vec3 commanded = transpose(R_BI) * commanded_B;
   const double dv[3] = {commanded[0], commanded[1], commanded[2]};
   const bool accepted = out_.out_maneuver(clock_.onboard_ns(wanted.t_ns), dv);
   maneuvers_.commanded(wanted, accepted);
@@ -469,62 +413,24 @@ void FormationGnc::command_burn(const Impulse& wanted) {
     out_.log(LogLevel::kError, "the thruster refused a burn");
     return;
   }
-  const Mat3 P_B = scale_.covariance(commanded_B);
-  const Maneuver maneuver = maneuver_of(expected, expected_B, P_B);
-  navigation_.maneuver(maneuver);
-  watch_burn(maneuver, R_BI, commanded_B);
+  const Maneuver expected = burn_observer_.expected(wanted.t_ns, R_BI, commanded_B);
+  navigation_.maneuver(expected);
+  burn_observer_.watch(expected, R_BI, commanded_B, navigation_);
   Payload notice;
   ByteWriter writer(notice.data, sizeof notice.data);
   writer.u8(kManeuverNotice);
   writer.i64(expected.t_ns);
   for (int k = 0; k < 3; ++k) writer.f64(expected.dv_ECI[k]);
-  writer.f64(maneuver.sigma_mps);
-  writer.f64(maneuver.more_along_mps);
+  writer.f64(expected.sigma_mps);
+  writer.f64(expected.more_along_mps);
   notice.bytes = writer.bytes();
   crosslink_.link().send(notice);  // a full window: the other's filter has to find out by itself
-  delta_v_mps_ += norm(expected_B);
+  delta_v_mps_ += norm(expected.dv_ECI);
   ++burns_;
   unsigned char stored[12];
   orrery_put_f64(stored, delta_v_mps_);
   orrery_put_u32(stored + 8, flight_crc32_common(stored, 8));
   out_.store(kDeltaVSlot, stored, sizeof stored);
-}
-
-// ---- the thruster's scale: velocity predicted with the burn, against what navigation finds later
-
-void FormationGnc::watch_burn(const Maneuver& burn, const Mat3& R_BI, const Vec3& commanded_B) {
-  if (watched_.waiting) return;
-  watched_.look_ns = burn.t_ns + nanoseconds(kScaleLook_s);
-  const FormationEstimate predicted = navigation_.at(watched_.look_ns);
-  watched_.waiting = predicted.valid;
-  watched_.expected_B = R_BI * burn.dv_ECI;
-  watched_.commanded_B = commanded_B;
-  watched_.R_BI = R_BI;
-  watched_.predicted_v = predicted.v_relative_ECI;
-  watched_.predicted_variance_B = velocity_variances(predicted, R_BI);
-  watched_.of_burn_B = variances(burn, watched_.expected_B);
-}
-
-void FormationGnc::learn_scale(std::int64_t now_ns) {
-  // Half a minute later the partner's measurements of that time have come.
-  if (!watched_.waiting || now_ns < watched_.look_ns + 30 * kNs) return;
-  watched_.waiting = false;
-  const FormationEstimate found = navigation_.at(watched_.look_ns);
-  if (!found.valid || !found.fixed) return;
-  // What was found rests on the prediction too, burn included; what measurements alone say is
-  // further off by before / (before - after), and as uncertain as their information makes it.
-  const Vec3 after_B = velocity_variances(found, watched_.R_BI);
-  Vec3 change_B = watched_.R_BI * (found.v_relative_ECI - watched_.predicted_v), sigma_B;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double before = watched_.predicted_variance_B[axis];
-    if (!(after_B[axis] < 0.9 * before)) return;
-    const double gain = before / (before - after_B[axis]);
-    change_B[axis] *= gain;
-    sigma_B[axis] =
-        std::sqrt(std::max(0.0, before - watched_.of_burn_B[axis]) + gain * after_B[axis]);
-  }
-  // Self burns, and the velocity is other less self.
-  scale_.observe(watched_.commanded_B, watched_.expected_B - change_B, sigma_B);
 }
 
 // ---- what is said
@@ -546,81 +452,6 @@ void FormationGnc::schedule(std::int64_t now_ns, std::int64_t now_onboard_ns) {
   next = std::min(next, crosslink_.link().due_ns(now_onboard_ns));
   // What is due and could not be done must not be asked for without end.
   out_.request_tick(next > now_onboard_ns ? next : now_onboard_ns + kRetry_ns);
-}
-
-void FormationGnc::send_estimate(const FormationEstimate& estimate) {
-  const FormationEstimate e = from_chief(estimate);
-  RelativeOutput output;
-  output.t_ns = e.t_ns;
-  for (int k = 0; k < 3; ++k) {
-    output.r_DC_RTN[k] = e.r_relative_RTN[k];
-    output.v_DC_RTN[k] = e.v_relative_RTN[k];
-    output.sigma_r_m[k] = std::sqrt(std::max(0.0, e.relative_covariance_RTN(k, k)));
-    output.sigma_v_mps[k] = std::sqrt(std::max(0.0, e.relative_covariance_RTN(k + 3, k + 3)));
-  }
-  out_.out_estimate(output);
-}
-
-// Whole cycles of deputy less chief, up to what all have in common.
-void FormationGnc::fill_integers(formation_gnc_telemetry* t) const {
-  const FormationFilter& filter = navigation_.filter();
-  unsigned count = 0;
-  for (int channel = 0; channel < kChannels; ++channel) {
-    const CarrierArc& self = filter.arcs(Who::kSelf)[channel];
-    const int at = self.prn != 0 ? filter.arcs(Who::kOther).find(self.prn) : -1;
-    if (at < 0 || !filter.integers().holds(self.prn)) continue;
-    const double cycles = filter.arcs(Who::kOther)[at].base_cycles - self.base_cycles +
-                          filter.integers().value(self.prn);
-    t->integer[count].prn = static_cast<unsigned>(self.prn);
-    t->integer[count++].cycles = std::llround(is_deputy() ? -cycles : cycles);
-  }
-}
-
-void FormationGnc::send_telemetry(std::int64_t now_ns, const FormationEstimate& estimate) {
-  const TransitionProtocol& protocol = mission_.protocol();
-  formation_gnc_telemetry t = {};
-  t.role = static_cast<unsigned>(configuration_.role);
-  t.mode = static_cast<std::uint32_t>(mode());
-  t.t_ns = now_ns;
-  if (estimate.valid) {
-    const RelativeElements a_roe = relative_orbit(situation(estimate)).a_roe;
-    const Matrix6& P = from_chief(estimate).relative_covariance_RTN;
-    for (int k = 0; k < 6; ++k) t.a_roe_m[k] = a_roe[k];
-    for (int k = 0; k < 3; ++k) {
-      t.sigma_r_m[k] = std::sqrt(std::max(0.0, P(k, k)));
-      t.sigma_v_mps[k] = std::sqrt(std::max(0.0, P(k + 3, k + 3)));
-    }
-  }
-  t.delta_v_mps = delta_v_mps_;
-  t.next_event_ns = protocol.has_pending() ? protocol.pending().begin_ns : 0;
-  t.minimum_separation_m = forecast_.minimum_m;
-  t.boot_count = boot_count_;
-  t.transition = protocol.record().executed_id;
-  t.late = protocol.late();
-  t.postponed = protocol.postponed();
-  t.rejected = rejected_;
-  t.burns = burns_;
-  t.observations = observations_;
-  t.skipped = skipped_ + protocol.withdrawn();
-  t.retransmissions = crosslink_.link().retransmissions();
-  t.fixed_ambiguities = static_cast<std::uint32_t>(estimate.fixed_ambiguities);
-  t.plan_entries = mission_.plan().size();
-  t.fault = is_emergency(mode()) ? protocol.record().fault : 0u;
-  t.measurements_sent = measurements_sent_;
-  t.measurements_heard = measurements_heard_;
-  t.drag_difference_mps2 = from_chief(estimate).drag_difference_mps2;
-  t.graphic = graphic_.telemetry();
-  t.sdcp = sdcp_.telemetry();
-  fill_integers(&t);
-  for (int nozzle = 0; nozzle < ThrusterScale::kNozzles; ++nozzle) {
-    t.nozzle_scale[nozzle] = scale_.scale(nozzle);
-    t.sigma_nozzle_scale[nozzle] = scale_.sigma(nozzle);
-  }
-  t.flags = (estimate.valid ? 1u : 0u) | (estimate.fixed ? 2u : 0u) |
-            (partner_heard_ns_ != 0 ? 4u : 0u) | (protocol.has_pending() ? 8u : 0u);
-  unsigned char message[FORMATION_GNC_TELEMETRY_BYTES];
-  formation_gnc_put_telemetry(message, &t);
-  out_.out_telemetry(message, sizeof message);
 }
 
 }  // namespace formation_gnc

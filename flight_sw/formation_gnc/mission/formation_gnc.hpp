@@ -17,6 +17,8 @@
 #include <cstdint>
 
 #include "formation_gnc/formation_gnc_messages.h"
+#include "formation_gnc/mission/burn_observer.hpp"
+#include "formation_gnc/mission/bus_attitude.hpp"
 #include "formation_gnc/mission/configuration.hpp"
 #include "formation_gnc/mission/crosslink_layer.hpp"
 #include "formation_gnc/mission/onboard_clock.hpp"
@@ -79,11 +81,6 @@ class FormationGnc {
   const MissionManager& mission() const { return mission_; }
 
  private:
-  struct Attitude {
-    std::int64_t t_ns = 0;  // GPS; 0: none yet
-    Quaternion q_BI;
-    double omega_B[3] = {};
-  };
   /// Innovations since boot, of epochs processed in time; replays do not count again.
   struct Innovations {
     std::uint32_t degrees = 0, rejected = 0;
@@ -96,16 +93,6 @@ class FormationGnc {
     }
     formation_gnc_innovations telemetry() const { return {degrees, rejected, chi2}; }
   };
-  /// What was commanded and is waited for, to learn the thruster's scale from.
-  struct Watched {
-    bool waiting = false;
-    std::int64_t look_ns = 0;
-    flight_support::Vec3 commanded_B, expected_B;
-    flight_support::Vec3 predicted_v;           // of other less self, ECI
-    flight_support::Mat3 R_BI;                  // in the middle of the burn
-    flight_support::Vec3 predicted_variance_B;  // of that velocity, burn included
-    flight_support::Vec3 of_burn_B;             // variance of its execution, as the filter has it
-  };
 
   bool is_deputy() const { return configuration_.role == Role::kDeputy; }
   bool reject() {
@@ -115,7 +102,6 @@ class FormationGnc {
   void ask_receiver(std::int64_t now_GPS_ns);
   void handle_epoch(const GnssEpoch& epoch, std::int64_t now_ns);
   void send_measurement(const GnssEpoch& epoch, const Quaternion& q_BI);
-  Quaternion attitude_at(std::int64_t t_ns) const;
   bool take_payload(const Payload& payload, std::int64_t now_ns);
   bool take_command(const unsigned char* message, std::uint32_t bytes);
   bool take_maneuver(const Payload& payload);
@@ -129,9 +115,6 @@ class FormationGnc {
   void place_observation(const FormationEstimate& estimate);
   void maneuver(const FormationEstimate& estimate);
   void command_burn(const Impulse& wanted);
-  void watch_burn(const Maneuver& burn, const flight_support::Mat3& R_BI,
-                  const flight_support::Vec3& commanded_B);
-  void learn_scale(std::int64_t now_ns);
   void send_due(std::int64_t now_ns);
   void schedule(std::int64_t now_ns, std::int64_t now_onboard_ns);
   Situation situation(const FormationEstimate& estimate) const;
@@ -152,9 +135,8 @@ class FormationGnc {
   CrosslinkLayer crosslink_;
   MissionManager mission_;
   ManeuverManager maneuvers_;
-  ThrusterScale scale_;
-  Attitude attitude_;
-  Watched watched_;
+  BurnObserver burn_observer_;
+  BusAttitude attitude_;
   Innovations graphic_, sdcp_;
   SeparationForecast forecast_;
 
