@@ -28,7 +28,7 @@ struct Targets {
   const char *chief = "", *deputy = "";
 };
 constexpr Targets kNative{}, kArm{"qemu-arm", "qemu-arm"}, kSoft{"qemu-arm1176", "qemu-arm1176"},
-    kMixed{"", "qemu-arm"};
+    kWide{"qemu-aarch64", "qemu-aarch64"}, kMixed{"", "qemu-arm"};
 
 struct Flown {
   std::string fingerprint;
@@ -84,9 +84,10 @@ Duration orbits_or(Duration otherwise) {
 }
 
 // Empty, or why there is nothing to fly.
-std::string missing(const char* library, const char* processor) {
-  if (std::system("command -v qemu-arm > /dev/null") != 0) {
-    return "qemu-arm is not installed (Debian package qemu-user)";
+std::string missing(const char* library, const std::string& processor) {
+  const std::string emulator = processor == "arm64" ? "qemu-aarch64" : "qemu-arm";
+  if (std::system(("command -v " + emulator + " > /dev/null").c_str()) != 0) {
+    return emulator + " is not installed (Debian package qemu-user)";
   }
   try {
     find_flight_library(std::string(library) + "@" + processor);
@@ -154,6 +155,17 @@ TEST(ProcessorTest, FirstFlightWithoutFloatingPointIsNearTheNativeOne) {
   expect_near(soft, here);
   EXPECT_EQ(first_flight(kSoft, span).fingerprint, soft.fingerprint);
   print_both("formation_keeping", here, "armel", soft);
+}
+
+// Words and pointers as here, another libm and instruction set.
+TEST(ProcessorTest, FirstFlightOnArm64IsNearTheNativeOneAndTheSameEveryTime) {
+  SKIP_WHERE_MISSING("formation_keeping", "arm64");
+  const Duration span = orbits_or(kOrbit);
+  const Flown here = first_flight(kNative, span), wide = first_flight(kWide, span);
+  ASSERT_GT(here.delta_v_mps, 0);
+  expect_near(wide, here);
+  EXPECT_EQ(first_flight(kWide, span).fingerprint, wide.fingerprint);
+  print_both("formation_keeping", here, "arm64", wide);
 }
 
 TEST(ProcessorTest, TelescopeOnArmIsNearTheNativeOneAndTheSameEveryTime) {
