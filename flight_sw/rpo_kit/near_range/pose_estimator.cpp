@@ -60,15 +60,6 @@ Mat3 hat(const Vec3& v) {
   return Mat3{{{0, -v[2], v[1]}, {v[2], 0, -v[0]}, {-v[1], v[0], 0}}};
 }
 
-// exp of a turn about the axes of C: R' = (I - [d x] + ...) R.
-Mat3 turned(const Vec3& d, const Mat3& R) {
-  const double angle = norm(d);
-  if (angle < 1e-12) return R - hat(d) * R;
-  const double s = std::sin(angle) / angle, c = (1.0 - std::cos(angle)) / (angle * angle);
-  const Mat3 D = identity<3>() - s * hat(d) + c * (hat(d) * hat(d));
-  return D * R;
-}
-
 class PoseFit {
  public:
   PoseFit(const Camera& camera, const std::vector<Vec3>& points_B,
@@ -194,6 +185,14 @@ double turn_between_rad(const Mat3& a, const Mat3& b) {
 }
 
 }  // namespace
+
+Mat3 turned(const Vec3& d, const Mat3& R) {
+  const double angle = norm(d);
+  if (angle < 1e-12) return R - hat(d) * R;
+  const double s = std::sin(angle) / angle, c = (1.0 - std::cos(angle)) / (angle * angle);
+  const Mat3 D = identity<3>() - s * hat(d) + c * (hat(d) * hat(d));
+  return D * R;
+}
 
 // Symbols as in Haralick et al. (1994), table 1 and eq. (9): s2 = u s1, s3 = v s1.
 int solve_three_points(const Vec3 points_B[3], const Vec3 directions_C[3], Pose poses[4]) {

@@ -54,4 +54,7 @@ bool estimate_pose(const Camera& camera, const std::vector<flight_support::Vec3>
 int solve_three_points(const flight_support::Vec3 points_B[3],
                        const flight_support::Vec3 directions_C[3], Pose poses[4]);
 
+/// exp(-[d x]) R: R_CB after a turn of the target relative to the camera by d, in axes of C.
+flight_support::Mat3 turned(const flight_support::Vec3& d, const flight_support::Mat3& R);
+
 }  // namespace rpo_kit
