@@ -9,6 +9,9 @@
  *     0 i64 exposure_ns, of its middle | 8 f64 q_CI[4], the camera's attitude
  *     | 40 f64 attitude_sigma_rad, per axis | 48 u32 count, at most 32
  *     | 52 per keypoint: u32 point, f64 u px, f64 v px, f64 sigma px
+ *   view, camera on the target -> chaser
+ *     0 f64 q_CI[4], the camera's attitude in the middle of the exposure
+ *     | 32 f64 attitude_sigma_rad, per axis | 40 `image` of orrery_messages.h, all rows
  *   target, chaser -> ground and payloads: how the target is turned
  *     0 i64 t_ns | 8 f64 q_BI[4] | 40 f64 omega_BI_B[3] rad/s | 64 f64 sigma_rad[3], about B
  *     | 88 u32 poses, flips, rejected, lost: of the near-range filter, since boot
@@ -41,6 +44,7 @@
 #define RPO_KIT_KEYPOINTS_BYTES \
   (RPO_KIT_KEYPOINTS_HEAD_BYTES + RPO_KIT_MOST_KEYPOINTS * RPO_KIT_KEYPOINT_BYTES)
 #define RPO_KIT_BEARING_BYTES 40u
+#define RPO_KIT_VIEW_HEAD_BYTES 40u
 #define RPO_KIT_TARGET_BYTES 104u
 #define RPO_KIT_IMAGING_BYTES 124u
 
@@ -231,6 +235,22 @@ ORRERY_MAYBE_UNUSED static int rpo_kit_get_keypoints(const unsigned char* messag
     k->seen[i].v_px = orrery_get_f64(at + 12);
     k->seen[i].sigma_px = orrery_get_f64(at + 20);
   }
+  return 1;
+}
+
+/* What stands before the image. */
+ORRERY_MAYBE_UNUSED static void rpo_kit_put_view_head(unsigned char* message, const double q_CI[4],
+                                                      double attitude_sigma_rad) {
+  orrery_put_f64s(message, q_CI, 4);
+  orrery_put_f64(message + 32, attitude_sigma_rad);
+}
+
+/* 1 if it is there; otherwise 0, and nothing is written. */
+ORRERY_MAYBE_UNUSED static int rpo_kit_get_view_head(const unsigned char* message, uint32_t bytes,
+                                                     double q_CI[4], double* attitude_sigma_rad) {
+  if (bytes < RPO_KIT_VIEW_HEAD_BYTES) return 0;
+  orrery_get_f64s(message, q_CI, 4);
+  *attitude_sigma_rad = orrery_get_f64(message + 32);
   return 1;
 }
 

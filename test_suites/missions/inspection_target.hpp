@@ -43,6 +43,12 @@ inline std::vector<std::vector<int>> target_faces() {
           {24, 25, 26, 27}, {31, 30, 29, 28}};
 }
 
+/// Of those, as the flight software has them.
+inline std::vector<double> target_albedos() {
+  return {0.42, 0.42, 0.3, 0.3, 0.22, 0.22, 0.06, 0.5, 0.5,
+          0.5,  0.5,  0.1, 0.1, 0.1,  0.1,  0.55, 0.06};
+}
+
 /// Closed boxes with a material for each side: -x, +x, -y, +y, -z, +z.
 inline std::string target_obj() {
   std::string text;

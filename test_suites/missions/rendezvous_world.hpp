@@ -152,6 +152,23 @@ struct TumblingBody {
   }
 };
 
+/// Any attitude, any axis.
+inline TumblingBody tumbling_body(RandomStream& random, double rate_radps) {
+  const Vec3 axis = unit(normal3(random, 1));
+  const double half = random.uniform(0, 3.14159265358979);
+  const Vec3 v = std::sin(half) * axis;
+  return {{std::cos(half), v.x, v.y, v.z}, rate_radps * unit(normal3(random, 1))};
+}
+/// Axes of a camera that looks along `z`.
+inline Mat3 looking_along(const Vec3& z) {
+  const Vec3 x = unit(cross(std::abs(z.z) < 0.8 ? Vec3{0, 0, 1} : Vec3{1, 0, 0}, z));
+  return {x, cross(z, x), z};
+}
+/// Of axes, by a small angle.
+inline Mat3 small_turn(const Vec3& d) {
+  return to_matrix(to_quaternion({{1, d.z, -d.y}, {-d.z, 1, d.x}, {d.y, -d.x, 1}}));
+}
+
 /// A body of 0.6 x 0.4 x 0.3 m with two panels, which half a turn about z leaves looking the same.
 inline const std::array<Vec3, 12> kKeypoints_B = {{{0.3, 0.2, 0.15},
                                                    {0.3, 0.2, -0.15},
@@ -189,11 +206,7 @@ class KeypointSensor final : public Device {
   void start(DeviceContext& io) override {
     io_ = &io;
     if (!tumbling_) {
-      RandomStream& random = io.random("tumbling");
-      const Vec3 axis = unit(normal3(random, 1));
-      const double half = random.uniform(0, 3.14159265358979);
-      const Vec3 v = std::sin(half) * axis;
-      body_ = {{std::cos(half), v.x, v.y, v.z}, options_.rate_radps * unit(normal3(random, 1))};
+      body_ = tumbling_body(io.random("tumbling"), options_.rate_radps);
       body_t_ = io.now();
       tumbling_ = true;
     }
@@ -215,13 +228,6 @@ class KeypointSensor final : public Device {
   int flipped() const { return flipped_; }
 
  private:
-  static Mat3 turn(const Vec3& d) {  // of axes, by a small angle
-    return to_matrix(to_quaternion({{1, d.z, -d.y}, {-d.z, 1, d.x}, {d.y, -d.x, 1}}));
-  }
-  static Mat3 looking_along(const Vec3& z) {
-    const Vec3 x = unit(cross(std::abs(z.z) < 0.8 ? Vec3{0, 0, 1} : Vec3{1, 0, 0}, z));
-    return {x, cross(z, x), z};
-  }
   static bool turned_to(const Vec3& corner_B, const Vec3& chaser_B) {
     const Vec3 d = chaser_B - corner_B;
     return d.x * corner_B.x > 0 || d.y * corner_B.y > 0 || d.z * corner_B.z > 0;
@@ -242,7 +248,7 @@ class KeypointSensor final : public Device {
     if (!may_be_seen(io.now(), target.r_ECI, unit(d))) return;
     const Mat3 R_CI =
         looking_along(unit(unit(d) + normal3(io.random("pointing"), options_.pointing_rad)));
-    const Mat3 known = turn(normal3(io.random("attitude"), options_.attitude_rad)) * R_CI;
+    const Mat3 known = small_turn(normal3(io.random("attitude"), options_.attitude_rad)) * R_CI;
     const Quaternion q = to_quaternion(known);
     rpo_kit_keypoints k{io.onboard_ns(), {q.w, q.x, q.y, q.z}, options_.attitude_rad, 0, {}};
     RandomStream& random = io.random("keypoints");
@@ -332,7 +338,13 @@ struct RendezvousWorld : FormationWorld {
     const TruthOf target = [this] { return spacecraft("target").truth(); };
     const SpacecraftHandle chaser = spacecraft("chaser");
     if (options.directions) chaser.add<DirectionSensor>(target, options.direction);
-    if (options.keypoints) keypoints_ = &chaser.add<KeypointSensor>(target, options.keypoint);
+    if (options.keypoints) {
+      keypoints_ = &chaser.add<KeypointSensor>(target, options.keypoint);
+      judge_attitude_by([this](SimTime t) { return keypoints_->body(t); },
+                        [this](double error_rad, double sigma_rad) {
+                          keypoints_->note_attitude(error_rad, sigma_rad);
+                        });
+    }
     chaser.add<BurnErrors>(options.burn_fraction, options.burn_angle_rad);
     chaser.connect("burn_errors", "thruster");
     const FlightHandle kit = flight("chaser");
@@ -359,6 +371,12 @@ struct RendezvousWorld : FormationWorld {
     ground().command("chaser", at(when), bytes);
   }
   const KeypointSensor& keypoints() const { return *keypoints_; }
+  /// Whose tumbling is true, and who is told what flight software made of it.
+  void judge_attitude_by(std::function<TumblingBody(SimTime)> body,
+                         std::function<void(double, double)> note) {
+    body_ = std::move(body);
+    note_ = std::move(note);
+  }
   double hours() const {
     return std::chrono::duration<double, std::ratio<3600>>(elapsed()).count();
   }
@@ -408,7 +426,7 @@ struct RendezvousWorld : FormationWorld {
                        &target_report);
     const rpo_kit_target& t = target_report;
     // Of the exposure, some seconds ago: the body goes on from the exposure before this question.
-    TumblingBody body = keypoints_->body(now());
+    TumblingBody body = body_(now());
     const double back_s = 1e-9 * static_cast<double>(to_ns(now()) - t.t_ns);
     body = backwards(body, back_s);
     const Mat3 D =
@@ -418,7 +436,7 @@ struct RendezvousWorld : FormationWorld {
     attitudes.push_back({elapsed(), std::acos(std::clamp(c, -1.0, 1.0)),
                          std::hypot(t.sigma_rad[0], t.sigma_rad[1], t.sigma_rad[2]),
                          norm(w - body.omega_BI_B)});
-    keypoints_->note_attitude(attitudes.back().error_rad, attitudes.back().sigma_rad);
+    note_(attitudes.back().error_rad, attitudes.back().sigma_rad);
   }
   /// Time turned round: rates change their sign, and the quaternion follows.
   static TumblingBody backwards(TumblingBody body, double dt_s) {
@@ -430,6 +448,8 @@ struct RendezvousWorld : FormationWorld {
 
   bool cooperative_;
   KeypointSensor* keypoints_ = nullptr;
+  std::function<TumblingBody(SimTime)> body_;
+  std::function<void(double, double)> note_;
 };
 
 }  // namespace orrery::rendezvous

@@ -19,11 +19,14 @@ class Reader final : public flight_support::ConfigurationReader {
     if (std::strcmp(key, "role") == 0) return set_role(value);
     if (std::strcmp(key, "waypoint") == 0) return add_waypoint(value);
     if (std::strcmp(key, "keypoint") == 0) return add_keypoint(value);
+    if (std::strcmp(key, "face") == 0) return add_face(value);
+    if (std::strcmp(key, "albedo") == 0) return set_albedo(value);
     if (std::strcmp(key, "star_catalogue") == 0) return set_star_catalogue(value);
     Configuration& c = *configuration_;
     Camera& camera = c.inspection.camera;
     double leap_seconds = c.earth_time.leap_seconds;
     double width = c.imaging.width, height = c.imaging.height;
+    double view_width = c.view_width, view_height = c.view_height;
     const NumberKey keys[] = {
         {"crosslink_period_s", &c.crosslink_period_s, 1.0, 600.0},
         {"telemetry_period_s", &c.telemetry_period_s, 1.0, 86400.0},
@@ -46,8 +49,11 @@ class Reader final : public flight_support::ConfigurationReader {
         {"inertia_y", &c.inspection.filter.inertia[1], 1e-3, 1e3},
         {"inertia_z", &c.inspection.filter.inertia[2], 1e-3, 1e3},
         {"tumble_noise_rad2ps3", &c.inspection.filter.angular_rad2ps3, 0.0, 1.0},
+        {"scale_error", &c.inspection.filter.scale_error, 0.0, 0.1},
         {"image_width_px", &width, 0.0, 4096.0},
         {"image_height_px", &height, 0.0, 4096.0},
+        {"view_width_px", &view_width, 64.0, 4096.0},
+        {"view_height_px", &view_height, 64.0, 4096.0},
         {"psf_sigma_px", &c.imaging.detection.psf_sigma_px, 0.3, 5.0},
         {"pair_magnitude", &c.imaging.pair_magnitude, -2.0, 20.0},
         {"target_size_m", &c.imaging.target_size_m, 0.0, 100.0},
@@ -61,8 +67,11 @@ class Reader final : public flight_support::ConfigurationReader {
       c.earth_time.leap_seconds = static_cast<int>(leap_seconds);
       c.imaging.width = static_cast<int>(width);
       c.imaging.height = static_cast<int>(height);
+      c.view_width = static_cast<int>(view_width);
+      c.view_height = static_cast<int>(view_height);
       if (c.earth_time.leap_seconds != leap_seconds || c.imaging.width != width ||
-          c.imaging.height != height) {
+          c.imaging.height != height || c.view_width != view_width ||
+          c.view_height != view_height) {
         return fail(key, "is no integer");
       }
       return true;
@@ -126,6 +135,36 @@ class Reader final : public flight_support::ConfigurationReader {
     return true;
   }
 
+  // Numbers of keypoints, counted from 0, up to kMostFaceCorners.
+  bool add_face(const char* value) {
+    InspectionOptions& inspection = configuration_->inspection;
+    if (inspection.face_count == kMostFaces) return fail("face", "is one too many");
+    WireframeFace& face = inspection.faces[inspection.face_count++];
+    face.count = 0;
+    for (;;) {
+      while (*value == ' ') ++value;
+      if (*value == '\0') break;
+      char* end = nullptr;
+      const long corner = std::strtol(value, &end, 10);
+      if (end == value || corner < 0 || corner >= kMostPoints) {
+        return fail("face", "has what is no number of a keypoint");
+      }
+      if (face.count == kMostFaceCorners) return fail("face", "has more corners than it takes");
+      face.corners[face.count++] = static_cast<int>(corner);
+      value = end;
+    }
+    return face.count >= 3 || fail("face", "needs three corners");
+  }
+
+  // Of the face before it.
+  bool set_albedo(const char* value) {
+    InspectionOptions& inspection = configuration_->inspection;
+    if (inspection.face_count == 0) return fail("albedo", "stands behind a face");
+    double& albedo = inspection.faces[inspection.face_count - 1].albedo;
+    if (!numbers("albedo", value, 1, &albedo)) return false;
+    return (albedo > 0.0 && albedo <= 1.0) || fail("albedo", "is not above 0 and at most 1");
+  }
+
   Configuration* configuration_;
   bool role_seen_ = false, waypoint_seen_ = false;
 };
@@ -143,6 +182,20 @@ bool parse_configuration(const char* text, std::size_t bytes, Configuration* con
   }
   imaging.field_radius_rad = std::atan2(0.5 * std::hypot(imaging.width, imaging.height),
                                         configuration->inspection.camera.fx);
+  const InspectionOptions& inspection = configuration->inspection;
+  if ((configuration->view_width > 0) != (configuration->view_height > 0)) {
+    return reader.fail("view_width_px", "and view_height_px go together");
+  }
+  if (configuration->view_width > 0) {
+    Wireframe wireframe;
+    const std::vector<flight_support::Vec3> corners(inspection.points_B,
+                                                    inspection.points_B + inspection.points);
+    const std::vector<WireframeFace> faces(inspection.faces,
+                                           inspection.faces + inspection.face_count);
+    if (!wireframe.set(corners, faces) || wireframe.empty()) {
+      return reader.fail("view_width_px", "needs faces of keypoints, each plane to 1 cm");
+    }
+  }
   const NavigationOptions& n = configuration->navigation;
   configuration->approach.burn_error = std::hypot(n.burn_fraction, n.burn_direction_rad);
   return true;

@@ -26,8 +26,9 @@ struct Configuration {
   ApproachOptions approach = {};
   AutonomyOptions autonomy = {};
   InspectionOptions inspection = {};
-  ImagingOptions imaging = {};   ///< its camera's field is that of `inspection`
-  char star_catalogue[96] = "";  ///< path; empty: frames are not looked at
+  ImagingOptions imaging = {};          ///< its camera's field is that of `inspection`
+  int view_width = 0, view_height = 0;  ///< of images of the target [px]; 0: none are looked at
+  char star_catalogue[96] = "";         ///< path; empty: frames are not looked at
 };
 
 /// @param message  Gets one line naming line number, key and accepted range if the text is wrong.

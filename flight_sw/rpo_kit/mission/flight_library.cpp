@@ -25,10 +25,11 @@ enum PortId : std::uint32_t {
   kKeypoints = 9,
   kTarget = 10,
   kImage = 11,
-  kImaging = 12
+  kImaging = 12,
+  kView = 13
 };
 
-constexpr int kPorts = 13;
+constexpr int kPorts = 14;
 constexpr std::uint32_t kMostImageBytes = 1u << 20;
 
 const unsigned char* data_of(Bytes bytes) {
@@ -112,6 +113,9 @@ class Library {
   std::int32_t image(std::int64_t, Bytes bytes) {
     return status(kit_.in_image(data_of(bytes), bytes.size));
   }
+  std::int32_t view(std::int64_t, Bytes bytes) {
+    return status(kit_.in_view(data_of(bytes), bytes.size));
+  }
   std::int32_t tick(std::int64_t now_ns) {
     kit_.in_tick(now_ns);
     return ORRERY_OK;
@@ -132,6 +136,7 @@ const Port (&Library::ports())[kPorts] {
       {kKeypoints, ORRERY_IN, ORRERY_PACKET, "keypoints", RPO_KIT_KEYPOINTS_BYTES,
        &Library::keypoints},
       {kImage, ORRERY_IN, ORRERY_PACKET, "camera", kMostImageBytes, &Library::image},
+      {kView, ORRERY_IN, ORRERY_PACKET, "view", kMostImageBytes, &Library::view},
       {kCrosslink, ORRERY_OUT, ORRERY_PACKET, "crosslink", formation_keeping::kCrosslinkBytes,
        nullptr},
       {kThruster, ORRERY_OUT, ORRERY_PACKET, "thruster", ORRERY_THRUSTER_BYTES, nullptr},

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <utility>
 
+#include "rpo_kit/imaging/earth_velocity.hpp"
 #include "rpo_kit/imaging/star_file.hpp"
 #include "rpo_kit/rpo_kit_messages.h"
 #include "support/orbit/constants.hpp"
@@ -54,6 +55,9 @@ void quaternion_of_matrix(const Mat3& R, double q[4]) {
   for (int k = 0; k < 4; ++k) q[k] /= size;
 }
 
+// Above that, 1-sigma, the track's attitude is no guess for an image.
+constexpr double kMostTurn_rad = 0.2;
+
 // A track within that of where the target should be is the target's.
 constexpr double kLeastReach_rad = 1e-3, kReachSigmas = 4.0;
 
@@ -92,6 +96,19 @@ bool frame_header(const orrery_image& image, FrameHeader* header) {
 
 }  // namespace
 
+struct RpoKit::TargetViews {
+  explicit TargetViews(const Configuration& c) {
+    const InspectionOptions& i = c.inspection;
+    wireframe.set({i.points_B, i.points_B + i.points}, {i.faces, i.faces + i.face_count});
+    pixels.resize(static_cast<std::size_t>(c.view_width) * static_cast<std::size_t>(c.view_height));
+  }
+  Wireframe wireframe;
+  KeypointFinder finder{wireframe};
+  std::vector<std::uint16_t> pixels;
+};
+
+RpoKit::~RpoKit() = default;
+
 RpoKit::RpoKit(Outputs& outputs, const Configuration& configuration, const Boot& boot)
     : out_(outputs),
       configuration_(configuration),
@@ -112,6 +129,9 @@ RpoKit::RpoKit(Outputs& outputs, const Configuration& configuration, const Boot&
     } else {
       out_.log(LogLevel::kError, message);
     }
+  }
+  if (is_chaser() && configuration_.view_width > 0) {
+    views_ = std::make_unique<TargetViews>(configuration_);
   }
   out_.out_mode(boot.now_ns, static_cast<std::uint32_t>(mode()));
   if (is_chaser()) {
@@ -207,7 +227,11 @@ bool RpoKit::in_keypoints(const unsigned char* message, std::uint32_t bytes) {
   }
   Observer own;
   // Before the first fix of its own orbit it knows no RTN.
-  if (!navigation_.own_at(k.exposure_ns, &own)) return true;
+  if (navigation_.own_at(k.exposure_ns, &own)) take_sighting(sighting, own);
+  return true;
+}
+
+void RpoKit::take_sighting(const Sighting& sighting, const Observer& own) {
   const int lost = inspection_.lost();
   const Sighted sighted = inspection_.look(sighting, own);
   if (inspection_.lost() != lost) {
@@ -220,6 +244,51 @@ bool RpoKit::in_keypoints(const unsigned char* message, std::uint32_t bytes) {
     navigation_.start_from_track(state, covariance);
   }
   if (inspection_.tracking()) send_target();
+}
+
+bool RpoKit::in_view(const unsigned char* message, std::uint32_t bytes) {
+  Sighting sighting;
+  double q_CI[4];
+  orrery_image image;
+  FrameHeader header;
+  if (views_ == nullptr ||
+      rpo_kit_get_view_head(message, bytes, q_CI, &sighting.attitude_sigma_rad) == 0 ||
+      orrery_get_image_header(message + RPO_KIT_VIEW_HEAD_BYTES, bytes - RPO_KIT_VIEW_HEAD_BYTES,
+                              &image) == 0 ||
+      image.width != static_cast<unsigned>(configuration_.view_width) ||
+      image.height != static_cast<unsigned>(configuration_.view_height) ||
+      image.rows != image.height || image.first_row != 0 || !frame_header(image, &header) ||
+      !(std::fabs(image.offset) < 65536.0) || !(sighting.attitude_sigma_rad >= 0.0) ||
+      !(sighting.attitude_sigma_rad < 1.0) || !matrix_of_quaternion(q_CI, &sighting.R_CI)) {
+    return reject();
+  }
+  const unsigned char* from = message + RPO_KIT_VIEW_HEAD_BYTES + ORRERY_IMAGE_HEADER_BYTES;
+  for (std::size_t k = 0; k < views_->pixels.size(); ++k) {
+    views_->pixels[k] = static_cast<std::uint16_t>(orrery_get_u16(from + 2 * k));
+  }
+  sighting.t_ns = header.t_ns;
+  sighting.camera = &header.camera;
+  Observer own;
+  if (!navigation_.own_at(header.t_ns, &own)) return true;
+  ExpectedPose expected;
+  bool known = inspection_.expect(sighting.t_ns, sighting.R_CI, own, &expected);
+  double reach_px = 0.0;
+  if (known) {
+    const double range_m = norm(expected.pose.r_BC_C), radius_m = views_->wireframe.radius_m();
+    reach_px = header.camera.fx / range_m *
+               std::hypot(radius_m * expected.rotation_sigma_rad, expected.across_sigma_m,
+                          radius_m / range_m * expected.along_sigma_m);
+    known = expected.rotation_sigma_rad < kMostTurn_rad && range_m > 2.0 * radius_m;
+  }
+  PixelNoise noise;
+  noise.electrons_per_dn = header.electrons_per_dn;
+  noise.offset_dn = image.offset;
+  const ImageView view{views_->pixels.data(), configuration_.view_width,
+                       configuration_.view_height};
+  const Vec3 to_sun_C = sighting.R_CI * sun_direction_ECI(sighting.t_ns);
+  views_->finder.find(header.camera, view, noise, to_sun_C, known ? &expected.pose : nullptr,
+                      reach_px, &sighting.seen);
+  if (!sighting.seen.empty()) take_sighting(sighting, own);
   return true;
 }
 

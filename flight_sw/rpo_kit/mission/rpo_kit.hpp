@@ -14,6 +14,7 @@
 
 #include "formation_keeping/crosslink_protocol.hpp"
 #include "rpo_kit/mission/configuration.hpp"
+#include "rpo_kit/near_range/keypoint_finder.hpp"
 #include "support/novatel/novatel.h"
 
 namespace rpo_kit {
@@ -52,6 +53,7 @@ class RpoKit {
  public:
   /// @param outputs  Outlives this object; is called from the constructor on.
   RpoKit(Outputs& outputs, const Configuration& configuration, const Boot& boot);
+  ~RpoKit();
   RpoKit(const RpoKit&) = delete;
   RpoKit& operator=(const RpoKit&) = delete;
 
@@ -67,6 +69,8 @@ class RpoKit {
   /// A frame of the camera, or bands of its rows one after the other. Not usable: damaged, of
   /// another size than announced, a band without the one before it, the same pixels once more.
   bool in_image(const unsigned char* message, std::uint32_t bytes);
+  /// An image of the target, with the camera's attitude: its keypoints are found in it.
+  bool in_view(const unsigned char* message, std::uint32_t bytes);
   void in_tick(std::int64_t now_ns);
 
   Mode mode() const { return autonomy_.mode(); }
@@ -90,6 +94,7 @@ class RpoKit {
   void command_burn(const flight_support::RelativeOrbit& now, const flight_support::Burn& burn);
   void send_estimate(const flight_support::RelativeOrbit& now,
                      const flight_support::Matrix6& covariance);
+  void take_sighting(const Sighting& sighting, const Observer& own);
   void look_at_frame(const FrameHeader& header);
   bool expected_target(std::int64_t t_ns, const Observer& own, ExpectedTarget* expected) const;
   void send_imaging(const FrameReport& report);
@@ -109,6 +114,9 @@ class RpoKit {
   Approach approach_;
   Autonomy autonomy_;
   std::unique_ptr<FrameProcessor> frames_;  // null: no camera
+  /// Images of the target; null: none are looked at.
+  struct TargetViews;
+  std::unique_ptr<TargetViews> views_;
   HotPixels hot_pixels_;
   std::vector<std::uint16_t> pixels_;  // of the frame that is coming in
   std::uint32_t frame_ = 0, frame_crc_ = 0, last_frame_crc_ = 0;

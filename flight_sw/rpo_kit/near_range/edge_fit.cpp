@@ -144,6 +144,32 @@ bool EdgeFit::refine(double reach_px, double step_px, int iterations, Pose* pose
   return true;
 }
 
+double EdgeFit::shading(const Pose& pose, const Vec3& to_sun_C) const {
+  const Mat3 R_BC = transpose(pose.R_CB);
+  std::vector<FacePoint> points;
+  wireframe_.lit_from(-1.0 * (R_BC * pose.r_BC_C), R_BC * to_sun_C, wireframe_.radius_m() / 20.0,
+                      &points);
+  double ss = 0, sa = 0, aa = 0, so = 0, ao = 0, oo = 0;
+  for (const FacePoint& p : points) {
+    Pixel at;
+    if (!project(camera_, pose.r_BC_C + pose.R_CB * p.point_B, &at)) continue;
+    if (!(at.u >= 0 && at.v >= 0 && at.u < image_.width - 1 && at.v < image_.height - 1)) continue;
+    const double o = pixel_at(at.u, at.v) - noise_.offset_dn;
+    ss += p.sunlight * p.sunlight, sa += p.sunlight * p.albedo, aa += p.albedo * p.albedo;
+    so += p.sunlight * o, ao += p.albedo * o, oo += o * o;
+  }
+  if (!(oo > 0.0) || !(aa > 0.0)) return 0.0;
+  // The best of both lights, of which neither is negative.
+  double best = std::max(0.0, ao) * ao / aa;
+  if (ss > 0.0) best = std::max(best, std::max(0.0, so) * so / ss);
+  const double determinant = ss * aa - sa * sa;
+  if (determinant > 1e-9 * ss * aa) {
+    const double sun = (aa * so - sa * ao) / determinant, sky = (ss * ao - sa * so) / determinant;
+    if (sun > 0.0 && sky > 0.0) best = sun * so + sky * ao;
+  }
+  return std::clamp(best / oo, 0.0, 1.0);
+}
+
 double EdgeFit::support(const Pose& pose, double reach_px, double step_px) {
   look(pose, reach_px, step_px, &sights_);
   int found = 0;

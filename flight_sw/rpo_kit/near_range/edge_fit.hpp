@@ -48,6 +48,9 @@ class EdgeFit {
   bool refine(double reach_px, double step_px, int iterations, Pose* pose);
   /// Part of the points that the image has within `reach_px`.
   double support(const Pose& pose, double reach_px, double step_px);
+  /// How much of the brightness of the faces the Sun and a light from everywhere explain, each of a
+  /// strength that fits: 1 all of it. @param to_sun_C  Unit vector.
+  double shading(const Pose& pose, const flight_support::Vec3& to_sun_C) const;
 
  private:
   double pixel_at(double u, double v) const;

@@ -1,5 +1,8 @@
 #include "rpo_kit/near_range/inspection.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "support/orbit/constants.hpp"
 #include "support/symmetric.hpp"
 
@@ -15,11 +18,13 @@ ChaserFrame frame_of(const Sighting& sighting, const Observer& own) {
 }
 
 // The camera's own attitude moves the place across the line of sight.
-PlaceMeasurement place_of(const Pose& pose, const ChaserFrame& frame) {
+PlaceMeasurement place_of(const Pose& pose, const ChaserFrame& frame, double scale_error) {
   const Mat3 R_IC = transpose(frame.R_CI);
   const Vec3& r = pose.r_BC_C;
   const Mat3 lever{{{0, -r[2], r[1]}, {r[2], 0, -r[0]}, {-r[1], r[0], 0}}};
-  Mat3 C = (frame.attitude_sigma_rad * frame.attitude_sigma_rad) * (lever * transpose(lever));
+  const Vec3 stretch = scale_error * r;
+  Mat3 C = (frame.attitude_sigma_rad * frame.attitude_sigma_rad) * (lever * transpose(lever)) +
+           stretch * transpose(stretch);
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) C(i, j) += pose.covariance(kPosePosition + i, kPosePosition + j);
   }
@@ -53,7 +58,8 @@ Sighted Inspection::look(const Sighting& sighting, const Observer& own) {
   const ChaserFrame frame = frame_of(sighting, own);
   burn_until(frame.t_ns, frame.orbital_rate_radps);
   Pose pose;
-  if (!estimate_pose(options_.camera, points_B_, sighting.seen, options_.pose, &pose)) {
+  const Camera& camera = sighting.camera != nullptr ? *sighting.camera : options_.camera;
+  if (!estimate_pose(camera, points_B_, sighting.seen, options_.pose, &pose)) {
     return result;
   }
   ++poses_;
@@ -65,8 +71,37 @@ Sighted Inspection::look(const Sighting& sighting, const Observer& own) {
     return result;
   }
   result.place = verdict != PoseVerdict::kRejected;
-  if (result.place) result.measurement = place_of(pose, frame);
+  if (result.place) result.measurement = place_of(pose, frame, options_.filter.scale_error);
   return result;
+}
+
+// Burns in between are told to a copy, as the sighting itself is still to come.
+bool Inspection::expect(std::int64_t t_ns, const Mat3& R_CI, const Observer& own,
+                        ExpectedPose* expected) const {
+  if (!filter_.started() || t_ns < filter_.t_ns()) return false;
+  const StateEci state = state_from_osculating(osculating_from_mean(own.mean));
+  const double n = mean_motion_radps(own.mean.a_m);
+  PoseFilter ahead = filter_;
+  for (const PendingBurn& burn : burns_) {
+    if (burn.t_ns > t_ns) break;
+    ahead.predict(burn.t_ns, n);
+    ahead.burn(burn.dv_RTN, burn.covariance_RTN);
+  }
+  ahead.predict(t_ns, n);
+  expected->pose.r_BC_C = R_CI * (transpose(eci_to_rtn(state)) * ahead.r_RTN());
+  expected->pose.R_CB = R_CI * transpose(ahead.R_BI());
+  const Vec3 u = (1.0 / norm(ahead.r_RTN())) * ahead.r_RTN();
+  const auto& P = ahead.covariance();
+  double along = 0.0, all = 0.0, turn = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    all += P(kNearPosition + i, kNearPosition + i);
+    turn += P(kNearRotation + i, kNearRotation + i);
+    for (int j = 0; j < 3; ++j) along += u[i] * P(kNearPosition + i, kNearPosition + j) * u[j];
+  }
+  expected->rotation_sigma_rad = std::sqrt(turn);
+  expected->along_sigma_m = std::sqrt(std::max(0.0, along));
+  expected->across_sigma_m = std::sqrt(std::max(0.0, all - along));
+  return true;
 }
 
 bool Inspection::settled() const {

@@ -14,6 +14,7 @@
 #include "rpo_kit/far_range/relative_orbit.hpp"
 #include "rpo_kit/far_range/relative_orbit_filter.hpp"
 #include "rpo_kit/near_range/pose_filter.hpp"
+#include "rpo_kit/near_range/wireframe.hpp"
 
 namespace rpo_kit {
 
@@ -23,6 +24,8 @@ struct InspectionOptions {
   Camera camera = {};
   flight_support::Vec3 points_B[kMostPoints];  ///< the target's keypoints [m]
   int points = 0;                              ///< how many; 0: the target's shape is not known
+  WireframeFace faces[kMostFaces];             ///< between them, to find them in images
+  int face_count = 0;
   PoseOptions pose = {};
   PoseFilterOptions filter = {};
   /// 1-sigma of the velocity below which the track may start the filter of the whole range [m/s].
@@ -35,6 +38,14 @@ struct Sighting {
   flight_support::Mat3 R_CI = flight_support::identity<3>();
   double attitude_sigma_rad = 0.0;  ///< 1-sigma per axis
   std::vector<Keypoint> seen;
+  const Camera* camera = nullptr;  ///< that it comes from; null: that of the options
+};
+
+/// What a camera should see.
+struct ExpectedPose {
+  Pose pose;                                         ///< without covariance
+  double rotation_sigma_rad = 0.0;                   ///< root of the sum of three axes
+  double across_sigma_m = 0.0, along_sigma_m = 0.0;  ///< of the place, to the line of sight
 };
 
 /// What a sighting gave.
@@ -50,6 +61,9 @@ class Inspection {
 
   /// @param own  The chaser's orbit at the sighting.
   Sighted look(const Sighting& sighting, const Observer& own);
+  /// @param R_CI  The camera's attitude at `t_ns`. @return false: there is no track.
+  bool expect(std::int64_t t_ns, const flight_support::Mat3& R_CI, const Observer& own,
+              ExpectedPose* expected) const;
   /// A burn of the chaser that will be, or was.
   void burn(std::int64_t t_ns, const flight_support::Vec3& dv_RTN,
             const flight_support::Mat3& covariance_RTN);

@@ -9,7 +9,7 @@ using namespace flight_support;
 
 namespace {
 
-constexpr double kStep_px = 3.0, kFineStep_px = 2.0, kAgree_px = 1.5, kApart_px = 3.0;
+constexpr double kStep_px = 3.0, kFineStep_px = 1.0, kAgree_px = 1.5, kApart_px = 2.2;
 constexpr double kTurned_rad = 0.35;
 
 double turn_between(const Mat3& a, const Mat3& b) {
@@ -56,7 +56,11 @@ Line line_through(const std::vector<const EdgeSight*>& points, double point_px) 
 
 }  // namespace
 
-double KeypointFinder::half_turns_support(EdgeFit& fit) const {
+double KeypointFinder::agreement(EdgeFit& fit, const Pose& pose) const {
+  return fit.support(pose, kAgree_px, kStep_px) * fit.shading(pose, to_sun_C_);
+}
+
+double KeypointFinder::best_half_turn(EdgeFit& fit) const {
   double best = 0.0;
   for (int axis = 0; axis < 3; ++axis) {
     Mat3 half = -1.0 * identity<3>();
@@ -65,7 +69,7 @@ double KeypointFinder::half_turns_support(EdgeFit& fit) const {
     pose.R_CB = pose_.R_CB * half;
     if (!fit.refine(5.0, kStep_px, 8, &pose)) continue;
     if (turn_between(pose.R_CB, pose_.R_CB) < kTurned_rad) continue;
-    best = std::max(best, fit.support(pose, kAgree_px, kStep_px));
+    best = std::max(best, agreement(fit, pose));
   }
   return best;
 }
@@ -77,8 +81,8 @@ Finding KeypointFinder::track(EdgeFit& fit, const Pose& guess, double reach_px) 
   }
   support_ = fit.support(pose_, kAgree_px, kStep_px);
   if (support_ < options_.least_support) return Finding::kNothing;
-  return half_turns_support(fit) > support_ + options_.flip_margin ? Finding::kNothing
-                                                                   : Finding::kTracked;
+  return best_half_turn(fit) > agreement(fit, pose_) + options_.flip_margin ? Finding::kNothing
+                                                                            : Finding::kTracked;
 }
 
 Finding KeypointFinder::acquire(EdgeFit& fit, const Camera& camera, const ImageView& image,
@@ -92,7 +96,7 @@ Finding KeypointFinder::acquire(EdgeFit& fit, const Camera& camera, const ImageV
     double rating = 0.0;
     if (fit.refine(reach_px, kStep_px, 14, &pose)) {
       rating = fit.support(pose, kAgree_px, kStep_px);
-      rating *= rating > 0.3 ? search_.explained(camera, pose) : 0.0;
+      rating *= rating > 0.3 ? search_.explained(camera, pose) * fit.shading(pose, to_sun_C_) : 0.0;
     }
     ratings.push_back(rating);
     if (rating > ratings[best]) best = ratings.size() - 1;
@@ -124,7 +128,10 @@ void KeypointFinder::corners(EdgeFit& fit, const Camera& camera, std::vector<Key
   std::vector<Line> lines;
   for (const auto& points : of_edge) lines.push_back(line_through(points, options_.point_px));
   for (std::size_t k = 0; k < wireframe_.corners_B().size(); ++k) {
-    double uu = 0, uv = 0, vv = 0, u = 0, v = 0;
+    // Where one line says nothing, along itself, the fitted pose does.
+    const double open = 1.0 / (options_.open_px * options_.open_px);
+    double uu = open, uv = 0, vv = open, u = 0, v = 0;
+    int meet = 0;
     for (std::size_t e = 0; e < lines.size(); ++e) {
       const Wireframe::Edge& edge = wireframe_.edges()[e];
       const Line& line = lines[e];
@@ -132,17 +139,17 @@ void KeypointFinder::corners(EdgeFit& fit, const Camera& camera, std::vector<Key
       if (!line.found || (edge.corners[0] != corner && edge.corners[1] != corner)) continue;
       const double s = edge.corners[0] == corner ? -0.5 : 0.5;
       const double w = 1.0 / (line.variance(s) + options_.floor_px * options_.floor_px);
+      ++meet;
       uu += w * line.du * line.du, uv += w * line.du * line.dv, vv += w * line.dv * line.dv;
       u += w * line.du * line.at(s), v += w * line.dv * line.at(s);
     }
     const double determinant = uu * vv - uv * uv, half = 0.5 * (uu + vv);
-    if (!(determinant > 1e-3 * half * half)) continue;
+    if (meet == 0) continue;
     // The larger half axis of the ellipse.
     const double least = half - std::sqrt(std::max(0.0, half * half - determinant));
     const double sigma_px = 1.0 / std::sqrt(least);
     Pixel at;
-    if (!(sigma_px < options_.most_sigma_px) ||
-        !project(camera, pose_.r_BC_C + pose_.R_CB * wireframe_.corners_B()[k], &at)) {
+    if (!project(camera, pose_.r_BC_C + pose_.R_CB * wireframe_.corners_B()[k], &at)) {
       continue;
     }
     at.u += (vv * u - uv * v) / determinant;
@@ -152,9 +159,11 @@ void KeypointFinder::corners(EdgeFit& fit, const Camera& camera, std::vector<Key
 }
 
 Finding KeypointFinder::find(const Camera& camera, const ImageView& image, const PixelNoise& noise,
-                             const Pose* guess, double reach_px, std::vector<Keypoint>* keypoints) {
+                             const Vec3& to_sun_C, const Pose* guess, double reach_px,
+                             std::vector<Keypoint>* keypoints) {
   keypoints->clear();
   support_ = 0.0;
+  to_sun_C_ = to_sun_C;
   EdgeFit fit(wireframe_, camera, image, noise);
   Finding finding = Finding::kNothing;
   if (guess != nullptr) finding = track(fit, *guess, reach_px);

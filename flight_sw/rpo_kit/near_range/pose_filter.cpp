@@ -59,7 +59,7 @@ void put(Covariance* P, int row, int column, const Mat3& block) {
 // Pose covariance in the axes of the filter: place in RTN, turn in B; the camera's own attitude
 // counts in both. A turn of R_CB about C is the opposite turn of R_BI about B.
 Matrix<6, 6> measured_covariance(const ChaserFrame& frame, const Pose& pose,
-                                 double least_rotation_rad) {
+                                 double least_rotation_rad, double scale_error) {
   const Mat3 R_HC = frame.R_HI * transpose(frame.R_CI);
   const Mat3 R_BC = transpose(pose.R_CB);
   Matrix<6, 6> T;
@@ -69,7 +69,8 @@ Matrix<6, 6> measured_covariance(const ChaserFrame& frame, const Pose& pose,
   Matrix<6, 6> own;
   const double variance = frame.attitude_sigma_rad * frame.attitude_sigma_rad;
   const Mat3 lever = hat(pose.r_BC_C);
-  const Mat3 place = variance * (lever * transpose(lever));
+  const Vec3 stretch = scale_error * pose.r_BC_C;
+  const Mat3 place = variance * (lever * transpose(lever)) + stretch * transpose(stretch);
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) own(r, c) = place(r, c);
     own(3 + r, 3 + r) = variance + least_rotation_rad * least_rotation_rad;
@@ -101,7 +102,8 @@ const Pose& after_flips(const Pose& pose) {
 }  // namespace
 
 void PoseFilter::start(const ChaserFrame& frame, const Pose& pose) {
-  const Matrix<6, 6> M = measured_covariance(frame, pose, options_.least_rotation_rad);
+  const Matrix<6, 6> M =
+      measured_covariance(frame, pose, options_.least_rotation_rad, options_.scale_error);
   t_ns_ = frame.t_ns;
   r_ = frame.R_HI * (transpose(frame.R_CI) * pose.r_BC_C);
   v_ = omega_ = Vec3();
@@ -222,7 +224,8 @@ PoseVerdict PoseFilter::update(const ChaserFrame& frame, const Pose& pose) {
   }
   if (frame.t_ns < t_ns_) return PoseVerdict::kRejected;
   predict(frame.t_ns, frame.orbital_rate_radps);
-  const Matrix<6, 6> R = measured_covariance(frame, pose, options_.least_rotation_rad);
+  const Matrix<6, 6> R =
+      measured_covariance(frame, pose, options_.least_rotation_rad, options_.scale_error);
   healthy_ = healthy_ && positive_definite(R);
   if (!healthy_) return PoseVerdict::kRejected;
   const Vec3 place = frame.R_HI * (transpose(frame.R_CI) * pose.r_BC_C) - r_;

@@ -32,6 +32,8 @@ struct PoseFilterOptions {
   double gate = 22.5;  ///< squared normalised innovation: 0.1 % of 6, 5e-5 of 3 degrees of freedom
   double least_rotation_rad = 0.005;  ///< added to what a pose says of itself
   int flips_to_believe = 6;
+  /// 1-sigma of a scale that images have in common: of the range, along the line of sight.
+  double scale_error = 0.0;
 };
 
 /// Of the chaser, at the instant of an exposure.

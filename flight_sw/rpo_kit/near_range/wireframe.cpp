@@ -9,7 +9,10 @@ using namespace flight_support;
 
 namespace {
 
-constexpr double kBefore_m = 0.01;
+// By which what hides is before what it hides: an edge lies on faces, a point of a face under a
+// patch.
+constexpr double kBefore_m = 0.01, kPatch_m = 0.001;
+constexpr double kSunFar_m = 1000.0;
 constexpr int kFewestPoints = 3, kMostPointsOfEdge = 40;
 
 }  // namespace
@@ -32,6 +35,7 @@ bool Wireframe::set(const std::vector<Vec3>& corners_B, const std::vector<Wirefr
     };
     const Vec3 normal = cross(at(1) - at(0), at(2) - at(0));
     if (!(norm(normal) > 1e-9)) return false;
+    face.albedo = given.albedo;
     face.normal_B = (1.0 / norm(normal)) * normal;
     face.offset_m = dot(face.normal_B, at(0));
     for (std::size_t k = 0; k < face.corners.size(); ++k) {
@@ -65,21 +69,54 @@ void Wireframe::add_edge(int from, int to, int face) {
 }
 
 // Where the ray from the eye to the point meets the plane of the face.
-bool Wireframe::hides(const Face& face, const Vec3& eye_B, const Vec3& point_B) const {
+bool Wireframe::hides(const Face& face, const Vec3& eye_B, const Vec3& point_B,
+                      double before_m) const {
   const Vec3 ray = point_B - eye_B;
   const double down = dot(face.normal_B, ray);
   if (!(down < 0.0)) return false;  // turned away
   const double part = (face.offset_m - dot(face.normal_B, eye_B)) / down;
-  if (!(part > 0.0) || (1.0 - part) * norm(ray) < kBefore_m) return false;
+  if (!(part > 0.0) || (1.0 - part) * norm(ray) < before_m) return false;
   const Vec3 hit = eye_B + part * ray;
   const Vec3 off = hit - face.middle_B;
   if (dot(off, off) > face.reach_m * face.reach_m) return false;
+  return is_inside(face, hit);
+}
+
+bool Wireframe::is_inside(const Face& face, const Vec3& point_B) const {
   for (std::size_t k = 0; k < face.corners.size(); ++k) {
     const Vec3& a = corners_[static_cast<std::size_t>(face.corners[k])];
     const Vec3& b = corners_[static_cast<std::size_t>(face.corners[(k + 1) % face.corners.size()])];
-    if (dot(cross(b - a, hit - a), face.normal_B) < 0.0) return false;
+    if (dot(cross(b - a, point_B - a), face.normal_B) < 0.0) return false;
   }
   return true;
+}
+
+void Wireframe::lit_from(const Vec3& eye_B, const Vec3& to_sun_B, double step_m,
+                         std::vector<FacePoint>* points) const {
+  points->clear();
+  const auto is_hidden = [this](const Vec3& eye, const Vec3& point) {
+    return std::any_of(faces_.begin(), faces_.end(),
+                       [&](const Face& face) { return hides(face, eye, point, kPatch_m); });
+  };
+  for (const Face& face : faces_) {
+    if (!(dot(face.normal_B, eye_B) > face.offset_m)) continue;
+    const Vec3 side = corners_[static_cast<std::size_t>(face.corners[0])] - face.middle_B;
+    const Vec3 x = (1.0 / norm(side)) * side, y = cross(face.normal_B, x);
+    const int half = static_cast<int>(face.reach_m / step_m);
+    const double cosine = std::max(0.0, dot(face.normal_B, to_sun_B));
+    for (int i = -half; i <= half; ++i) {
+      for (int j = -half; j <= half; ++j) {
+        FacePoint point;
+        point.point_B = face.middle_B + (i * step_m) * x + (j * step_m) * y;
+        if (!is_inside(face, point.point_B) || is_hidden(eye_B, point.point_B)) continue;
+        point.albedo = face.albedo;
+        if (cosine > 0.0 && !is_hidden(point.point_B + kSunFar_m * to_sun_B, point.point_B)) {
+          point.sunlight = face.albedo * cosine;
+        }
+        points->push_back(point);
+      }
+    }
+  }
 }
 
 void Wireframe::seen_from(const Vec3& eye_B, double step_m, std::vector<EdgePoint>* points) const {
@@ -104,7 +141,7 @@ void Wireframe::seen_from(const Vec3& eye_B, double step_m, std::vector<EdgePoin
       for (std::size_t f = 0; f < faces_.size() && !hidden; ++f) {
         const int id = static_cast<int>(f);
         if (id == edge.faces[0] || id == edge.faces[1]) continue;
-        hidden = hides(faces_[f], eye_B, point.point_B);
+        hidden = hides(faces_[f], eye_B, point.point_B, kBefore_m);
       }
       if (!hidden) points->push_back(point);
     }

@@ -20,6 +20,7 @@ constexpr int kMostFaces = 32, kMostFaceCorners = 8;
 struct WireframeFace {
   int corners[kMostFaceCorners] = {};
   int count = 0;
+  double albedo = 0.3;  ///< diffuse
 };
 
 /// A point of an edge.
@@ -27,6 +28,13 @@ struct EdgePoint {
   int edge = 0;
   double along = 0.0;  ///< 0 at its first corner, 1 at its second
   flight_support::Vec3 point_B;
+};
+
+/// A point of a face that is seen, and what light it gives.
+struct FacePoint {
+  flight_support::Vec3 point_B;
+  double albedo = 0.0;
+  double sunlight = 0.0;  ///< albedo times the cosine of the Sun's angle; 0 in a shadow
 };
 
 class Wireframe {
@@ -54,14 +62,20 @@ class Wireframe {
   void seen_from(const flight_support::Vec3& eye_B, double step_m,
                  std::vector<EdgePoint>* points) const;
 
+  /// Points of the faces that are seen from `eye_B`, and whether the Sun lights them.
+  /// @param to_sun_B  Unit vector. @param step_m  Between them.
+  void lit_from(const flight_support::Vec3& eye_B, const flight_support::Vec3& to_sun_B,
+                double step_m, std::vector<FacePoint>* points) const;
+
  private:
   struct Face {
     std::vector<int> corners;
     flight_support::Vec3 normal_B, middle_B;
-    double offset_m = 0.0, reach_m = 0.0;
+    double offset_m = 0.0, reach_m = 0.0, albedo = 0.0;
   };
   bool hides(const Face& face, const flight_support::Vec3& eye_B,
-             const flight_support::Vec3& point_B) const;
+             const flight_support::Vec3& point_B, double before_m) const;
+  bool is_inside(const Face& face, const flight_support::Vec3& point_B) const;
   void add_edge(int from, int to, int face);
 
   std::vector<flight_support::Vec3> corners_;

@@ -38,6 +38,21 @@ TEST(EarthVelocityTest, FollowsErfaFrom2000To2050) {
   EXPECT_GT(worst, 10.0);  // the Sun's own motion is left out
 }
 
+TEST(EarthVelocityTest, SunIsWhereErfaHasIt) {
+  double worst_rad = 0.0;
+  for (int k = 0; k < 600; ++k) {
+    const std::int64_t t_ns = (1043 + k * 4) * kWeek_ns + k * 100000 * kSecond_ns;
+    double heliocentric[2][3], barycentric[2][3];
+    eraEpv00(2444244.5, seconds(t_ns) / 86400.0, heliocentric, barycentric);
+    const double* r = heliocentric[0];
+    const Vec3 sun = -1.0 * vec3(r[0], r[1], r[2]);
+    const Vec3 ours = sun_direction_ECI(t_ns);
+    EXPECT_NEAR(norm(ours), 1.0, 1e-12);
+    worst_rad = std::max(worst_rad, norm(cross(ours, (1.0 / norm(sun)) * sun)));
+  }
+  EXPECT_LT(worst_rad, 3.5e-4);  // 0.02 deg
+}
+
 class StarFileTest : public testing::Test {
  protected:
   bool load(const char* text) {

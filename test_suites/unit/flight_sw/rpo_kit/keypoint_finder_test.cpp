@@ -48,6 +48,7 @@ rpo_kit::Wireframe wireframe() {
   for (const std::vector<int>& given : orrery::rendezvous::target_faces()) {
     rpo_kit::WireframeFace face;
     for (const int corner : given) face.corners[face.count++] = corner;
+    face.albedo = orrery::rendezvous::target_albedos()[faces.size()];
     faces.push_back(face);
   }
   rpo_kit::Wireframe wireframe;
@@ -65,6 +66,7 @@ orrery::Mat3 of(const Mat3& m) {
 /// The camera's axes are ECI's here, 7000 km above the Earth's middle.
 struct Picture {
   rpo_kit::Pose truth;
+  Vec3 to_sun_C;
   orrery::DigitalImage image;
   rpo_kit::ImageView view() const { return {image.values.data(), image.width_px, image.height_px}; }
 };
@@ -85,6 +87,7 @@ Picture picture(std::uint64_t seed, double range_m) {
   const double phase = kDegree * (20 + 90 * noise.uniform()), turn = 6.28 * noise.uniform();
   const orrery::Vec3 to_sun{std::sin(phase) * std::cos(turn), std::sin(phase) * std::sin(turn),
                             -std::cos(phase)};
+  p.to_sun_C = vec3(to_sun.x, to_sun.y, to_sun.z);
   static const orrery::PinholeCamera camera(lens());
   static orrery::Scene scene(
       camera, {.aperture_m = 0.003},
@@ -161,7 +164,7 @@ TEST(KeypointFinderTest, CornersNearAGuessAreThoseOfTheModel) {
     guess.r_BC_C = 1.01 * guess.r_BC_C;
     guess.R_CB = rpo_kit::turned(3 * kDegree * direction(noise), guess.R_CB);
     std::vector<rpo_kit::Keypoint> keypoints;
-    finder.find(flight_camera(), p.view(), kNoise, &guess, 3.0, &keypoints);
+    finder.find(flight_camera(), p.view(), kNoise, p.to_sun_C, &guess, 3.0, &keypoints);
     found += keypoints.empty() ? 0 : 1;
     compare(p, keypoints, &corners);
     rpo_kit::Pose pose;
@@ -197,7 +200,8 @@ TEST(KeypointFinderTest, AttitudeIsFoundWithoutAGuess) {
   for (int k = 0; k < count; ++k) {
     const Picture p = picture(500 + static_cast<std::uint64_t>(k), 55);
     std::vector<rpo_kit::Keypoint> keypoints;
-    const auto finding = finder.find(flight_camera(), p.view(), kNoise, nullptr, 0, &keypoints);
+    const auto finding =
+        finder.find(flight_camera(), p.view(), kNoise, p.to_sun_C, nullptr, 0, &keypoints);
     if (finding != rpo_kit::Finding::kAcquired) continue;
     (turn_deg(finder.pose().R_CB, p.truth.R_CB) < 20 ? right : wrong)++;
   }
@@ -219,7 +223,8 @@ TEST(KeypointFinderTest, FlippedGuessIsNotFollowed) {
       rpo_kit::Pose guess = p.truth;
       guess.R_CB = guess.R_CB * half;
       std::vector<rpo_kit::Keypoint> keypoints;
-      const auto finding = finder.find(flight_camera(), p.view(), kNoise, &guess, 2.0, &keypoints);
+      const auto finding =
+          finder.find(flight_camera(), p.view(), kNoise, p.to_sun_C, &guess, 2.0, &keypoints);
       if (keypoints.empty()) continue;
       flipped += turn_deg(finder.pose().R_CB, p.truth.R_CB) > 20 ? 1 : 0;
       EXPECT_LT(turn_deg(finder.pose().R_CB, p.truth.R_CB), 20)
@@ -227,6 +232,23 @@ TEST(KeypointFinderTest, FlippedGuessIsNotFollowed) {
     }
   }
   EXPECT_EQ(flipped, 0);
+}
+
+// The pose that is true explains the faces' light, its half turns do not.
+TEST(EdgeFitTest, LightTellsAHalfTurn) {
+  const rpo_kit::Wireframe shape = wireframe();
+  const Picture p = picture(519, 40);
+  const rpo_kit::EdgeFit fit(shape, flight_camera(), p.view(), kNoise);
+  const double own = fit.shading(p.truth, p.to_sun_C);
+  EXPECT_GT(own, 0.9);  // a patch's shadow and the lobe of the panels are not in it
+  for (int axis = 0; axis < 3; ++axis) {
+    Mat3 half = -1.0 * flight_support::identity<3>();
+    half(axis, axis) = 1;
+    rpo_kit::Pose turned = p.truth;
+    turned.R_CB = turned.R_CB * half;
+    EXPECT_LT(fit.shading(turned, p.to_sun_C), own - 0.05) << axis;
+  }
+  EXPECT_LT(fit.shading(p.truth, -1.0 * p.to_sun_C), own - 0.05);
 }
 
 // The closed form: of a box seen along a diagonal nine of twelve edges, along an axis four, and
@@ -261,6 +283,17 @@ TEST(WireframeTest, EdgesThatAreTurnedAwayOrHiddenAreNotSeen) {
   ASSERT_TRUE(box.set(corners, faces));
   EXPECT_EQ(edges(box, vec3(20, 0, 0)), 0u);
   EXPECT_EQ(edges(box, vec3(-20, 0, 0)), 4u);
+  // With the Sun behind the plate the near side is dark, with it behind the eye it is not.
+  std::vector<rpo_kit::FacePoint> lit;
+  box.lit_from(vec3(3, 0.1, 0.1), vec3(1, 0, 0), 0.3, &lit);
+  ASSERT_GT(lit.size(), 10u);
+  for (const rpo_kit::FacePoint& point : lit) EXPECT_EQ(point.sunlight, 0);
+  box.lit_from(vec3(-20, 0, 0), vec3(-0.8, 0.6, 0), 0.3, &lit);
+  for (const rpo_kit::FacePoint& point : lit) {
+    if (point.point_B[0] < 0) {
+      EXPECT_NEAR(point.sunlight, 0.3 * 0.8, 1e-12);
+    }
+  }
   faces.push_back({{0, 3, 5, 6}, 4});  // not plane
   EXPECT_FALSE(box.set(corners, faces));
 }

@@ -251,6 +251,50 @@ TEST(RpoKitTest, FramesComeWholeOrInBands) {
   EXPECT_FALSE(other.in_image(whole.data(), static_cast<std::uint32_t>(whole.size())));
 }
 
+// A tetrahedron of 2 m.
+const char* const kTetrahedron =
+    "role = chaser\nview_width_px = 64\nview_height_px = 64\nkeypoint = 1 1 1\nkeypoint = 1 -1 -1\n"
+    "keypoint = -1 1 -1\nkeypoint = -1 -1 1\nface = 0 1 2\nface = 0 3 1\nalbedo = 0.5\n"
+    "face = 0 2 3\nface = 1 3 2\n";
+
+TEST(RpoKitTest, ViewsThatAreDamagedAreRejected) {
+  Bus bus;
+  RpoKit chaser(bus, configured(kTetrahedron), {kEpoch_ns, 0});
+  std::vector<unsigned char> image = band(1, 0, 64);
+  const auto give_view = [&](double w, double sigma_rad) {
+    std::vector<unsigned char> message(RPO_KIT_VIEW_HEAD_BYTES);
+    const double q_CI[4] = {w, 0, 0, 0};
+    rpo_kit_put_view_head(message.data(), q_CI, sigma_rad);
+    message.insert(message.end(), image.begin(), image.end());
+    return chaser.in_view(message.data(), static_cast<std::uint32_t>(message.size()));
+  };
+  EXPECT_TRUE(give_view(1, 1e-5));     // it does not know where it is
+  EXPECT_FALSE(give_view(0.9, 1e-5));  // no rotation
+  EXPECT_FALSE(give_view(1, -1));
+  EXPECT_FALSE(give_view(1, std::nan("")));
+  image.pop_back();
+  EXPECT_FALSE(give_view(1, 1e-5));
+  image = band(1, 0, 32);
+  EXPECT_FALSE(give_view(1, 1e-5));  // half of it
+  image = band(1, 0, 64);
+  orrery_put_f64(image.data() + 48, std::nan(""));
+  EXPECT_FALSE(give_view(1, 1e-5));
+  image.clear();
+  EXPECT_FALSE(give_view(1, 1e-5));
+  EXPECT_FALSE(chaser.in_view(nullptr, 0));
+  // Where it knows its orbit, an image of nothing gives nothing.
+  Noise noise(5);
+  const StateEci state = flight_test::state_of_mean(flight_test::reference_chief());
+  const auto own = flight_test::bestxyz_frame(flight_test::noisy_fix(kEpoch_ns, state, &noise));
+  ASSERT_TRUE(chaser.in_gnss(kEpoch_ns, own.data(), static_cast<std::uint32_t>(own.size())));
+  image = band(2, 0, 64);
+  EXPECT_TRUE(give_view(1, 1e-5));
+  EXPECT_FALSE(chaser.inspection().tracking());
+  Bus blind;
+  RpoKit other(blind, configured("role = chaser\n"), {kEpoch_ns, 0});
+  EXPECT_FALSE(other.in_view(image.data(), static_cast<std::uint32_t>(image.size())));
+}
+
 TEST(RpoKitConfigurationTest, WrongTextIsNamed) {
   const auto complaint = [](const char* text) {
     Configuration configuration;
@@ -269,6 +313,18 @@ TEST(RpoKitConfigurationTest, WrongTextIsNamed) {
   EXPECT_NE(complaint("waypoint = -100 20 3\n").find("lacks a number"), std::string::npos);
   EXPECT_NE(complaint("waypoint = -100 0 3 0\n").find("radius_m > 0"), std::string::npos);
   EXPECT_NE(complaint("keypoint = 1 2 3 4\n").find("more numbers"), std::string::npos);
+  EXPECT_NE(complaint("face = 0 1\n").find("needs three corners"), std::string::npos);
+  EXPECT_NE(complaint("face = 0 1 x\n").find("no number"), std::string::npos);
+  EXPECT_NE(complaint("face = 0 1 2 3 4 5 6 7 8\n").find("more corners"), std::string::npos);
+  EXPECT_NE(complaint("albedo = 0.5\n").find("behind a face"), std::string::npos);
+  EXPECT_NE(complaint("view_width_px = 64\n").find("go together"), std::string::npos);
+  EXPECT_NE(complaint("view_width_px = 64\nview_height_px = 64\n").find("needs faces"),
+            std::string::npos);
+  const Configuration seen = configured(kTetrahedron);
+  EXPECT_EQ(seen.inspection.face_count, 4);
+  EXPECT_EQ(seen.inspection.faces[1].corners[1], 3);
+  EXPECT_EQ(seen.inspection.faces[1].albedo, 0.5);
+  EXPECT_EQ(seen.view_height, 64);
   const Configuration own = configured(
       "waypoint = -100 20 3 1\nwaypoint = 0 15 2 0\nkeypoint = 0.1 -0.2 0.3\ncamera_f_px = 2000\n");
   EXPECT_EQ(own.approach.plan.count, 2);
