@@ -1,8 +1,7 @@
+#include <orrery/harness/kernel/worker_thread.hpp>
 #include <orrery/harness/record/call_queue.hpp>
 
 #include <algorithm>
-#include <csignal>
-#include <sched.h>
 #include <unistd.h>
 
 namespace orrery {
@@ -11,30 +10,6 @@ namespace {
 // A block stays in the second cache of a processor; handing one over costs some microseconds.
 constexpr std::size_t kBlockBytes = 256 * 1024;
 constexpr std::size_t kMostBlocks = 16;
-
-/// While it lives, threads that begin take no signals: those of a test program are for its own.
-class SignalsBlocked {
- public:
-  SignalsBlocked() {
-    sigset_t all;
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &before_);
-  }
-  ~SignalsBlocked() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
-  SignalsBlocked(const SignalsBlocked&) = delete;
-  SignalsBlocked& operator=(const SignalsBlocked&) = delete;
-
- private:
-  sigset_t before_;
-};
-
-// Of the program as it was started: a thread may keep to one of them since (SharedCore).
-const cpu_set_t kCores = [] {
-  cpu_set_t cores;
-  CPU_ZERO(&cores);
-  sched_getaffinity(0, sizeof cores, &cores);
-  return cores;
-}();
 
 }  // namespace
 
@@ -103,12 +78,8 @@ void CallQueue::hand_over() {
   }
   rethrow_error();
   if (!thread_.joinable()) {
-    const SignalsBlocked blocked;
     process_ = getpid();
-    thread_ = std::thread([this] {
-      sched_setaffinity(0, sizeof kCores, &kCores);
-      make_calls();
-    });
+    thread_ = worker_thread([this] { make_calls(); });
   }
   {
     const std::lock_guard lock(mutex_);

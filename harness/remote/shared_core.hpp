@@ -20,7 +20,8 @@ namespace orrery {
 /// all stay where it is. Concerns speed only.
 ///
 /// A child that sets its affinity itself is left alone from then on. Where the thread has but one
-/// core nothing is done. A thread that is started meanwhile inherits the one core.
+/// core nothing is done. A thread that is started meanwhile inherits the one core, unless by
+/// worker_thread().
 class SharedCore {
  public:
   /// Of the calling thread; one for all that it calls.

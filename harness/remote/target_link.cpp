@@ -1,3 +1,4 @@
+#include <orrery/harness/kernel/worker_thread.hpp>
 #include <orrery/harness/remote/target_link.hpp>
 
 #include <algorithm>
@@ -186,11 +187,7 @@ class TargetLink::Watch {
     return std::make_unique<Watch>(path, patience);
   }
   Watch(const std::string& path, Duration patience) : patience_(patience) {
-    sigset_t all, before;
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &before);  // signals are for other threads
-    thread_ = std::thread([this, path] { run(path); });
-    pthread_sigmask(SIG_SETMASK, &before, nullptr);
+    thread_ = worker_thread([this, path] { run(path); });
   }
   ~Watch() {
     if (getpid() != process_) {  // a fork has no other threads

@@ -634,7 +634,7 @@ void add_samples(ElectronImage& image, Image<float>& covered, const MeshSamples&
     spread_rows(covered, joined, joined.covered, across, down, weight / (s.per_px_u * s.per_px_v));
   };
   std::thread other;
-  if (threads > 1) other = std::thread(spread_covered);
+  if (threads > 1) other = worker_thread(spread_covered);
   spread_rows(image, joined, joined.suns, across, down, weight * electrons_per_sun);
   if (threads > 1) {
     other.join();

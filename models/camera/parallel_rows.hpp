@@ -1,7 +1,7 @@
 /// Rows of an image on several threads. Not installed.
 #pragma once
 
-#include <orrery/harness/kernel/simulator_only.hpp>
+#include <orrery/harness/kernel/worker_thread.hpp>
 
 #include <thread>
 #include <vector>
@@ -16,8 +16,8 @@ void for_bands_of_rows(int threads, int height, const Work& work) {
   if (threads <= 1) return work(0, height);
   std::vector<std::thread> others;
   for (int k = 1; k < threads; ++k) {
-    others.emplace_back(
-        [&work, k, threads, height] { work(height * k / threads, height * (k + 1) / threads); });
+    others.push_back(worker_thread(
+        [&work, k, threads, height] { work(height * k / threads, height * (k + 1) / threads); }));
   }
   work(0, height / threads);
   for (std::thread& other : others) other.join();
