@@ -21,7 +21,7 @@ from make_page import PICTURES, fly, rows, seconds, start_ns
 FAR = "RendezvousFarRangeCampaign.DirectionsAndBurnsShowTheRange"
 NEAR = "RendezvousInspectionCampaign.FollowsATumblingTargetFromSixtyToFifteenMetres"
 WHOLE = "RendezvousCampaign.ArrivesFromThirtyKilometresThroughOutages"
-RANGES_M = (25000, 20000, 15000, 10000, 6000, 4000, 3000, 2000)
+RANGES_M = (30000, 25000, 20000, 15000, 10000, 6000, 4000, 3000, 2000)
 
 
 def fly_all(build, flights, seeds, runs):
@@ -53,7 +53,7 @@ def navigation(run):
 def far_figure(flights):
     runs = flown(flights, "far", FAR)
     figure = Figure(820, 600)
-    top = figure.axes(70, 36, 720, 240, x_range=(1.8, 30), y_range=(-3.2, 3.2), log_x=True,
+    top = figure.axes(70, 36, 720, 240, x_range=(1.8, 36), y_range=(-3.2, 3.2), log_x=True,
                       y_step=1, x_label="range [km]", y_label="range error [%]",
                       title=f"Directions and burns alone, {len(runs)} seeds: error of the range")
     km, error, sigma = [], [], []

@@ -124,7 +124,7 @@ void fly_far_range(RunId run, Duration within) {
               norm(last.r_m), last.range_error_m(), last.range_sigma_m(), world.telemetry.burns);
   expect_frames_were_right(world);
   EXPECT_LT(std::abs(last.range_error_m()), 0.03 * norm(last.r_m));
-  EXPECT_GT(world.telemetry.burns, 1u);
+  EXPECT_GT(world.telemetry.burns, arrived ? 5u : 0u);
   EXPECT_GT(world.telemetry.used[1], 40u);
   EXPECT_EQ(world.telemetry.used[0] + world.telemetry.used[2], 0u);
   EXPECT_EQ(world.telemetry.restarts, 0u);
@@ -140,7 +140,8 @@ void fly_far_range(RunId run, Duration within) {
 }  // namespace
 
 // Required: range error below 3 % (1 sigma), a covariance that says so, never a wrong attitude. The
-// first hours here: batch, filter, and the first burns; with WHOLE_FLIGHT=1 to 2 km.
+// first hours here: batch, filter, and the burn by which the range shows; with WHOLE_FLIGHT=1 to 2
+// km.
 TEST(RendezvousImagesCampaign, FramesAndBurnsShowTheRange) {
   if (sky().stars().empty()) GTEST_SKIP() << "no star catalogue";
   const bool whole = std::getenv("WHOLE_FLIGHT") != nullptr;

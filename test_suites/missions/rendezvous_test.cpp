@@ -22,17 +22,17 @@ double rms(const CampaignMetric& metric) {
 // ---- figure 22, left: directions alone
 
 /// Ranges at which navigation is judged, when they are first reached [m].
-constexpr std::array<double, 8> kJudged_m = {25e3, 20e3, 15e3, 10e3, 6e3, 4e3, 3e3, 2e3};
+constexpr std::array<double, 9> kJudged_m = {30e3, 25e3, 20e3, 15e3, 10e3, 6e3, 4e3, 3e3, 2e3};
 
 std::string at_range(const char* what, double range_m) {
   return what + std::string("_at_") + std::to_string(static_cast<int>(range_m)) + "m";
 }
 
-/// 30 km behind a target that says nothing. Legs to 15, 6 and 2 km; the spirals are those of the
-/// default plan.
+/// Some 34 km behind a target that says nothing: what is to be known at 30 km has to be found out
+/// before. Legs to 15, 6 and 2 km; the spirals are those of the default plan.
 RendezvousOptions far_range(RunId run) {
   RendezvousOptions options;
-  options.roe_m = {.da = 0, .dl = -30e3, .dex = 80, .dey = 290, .dix = 80, .diy = 290};
+  options.roe_m = {.da = 0, .dl = -34e3, .dex = 80, .dey = 290, .dix = 80, .diy = 290};
   options.config =
       "waypoint = -15000 250 8 0\nwaypoint = -6000 200 8 0\nwaypoint = -1900 150 6 0\n";
   options.burn_fraction = 0.01;
@@ -43,7 +43,17 @@ RendezvousOptions far_range(RunId run) {
 }
 
 void fly_far_range(RunId run) {
-  RendezvousWorld world(far_range(run));
+  const RendezvousOptions options = far_range(run);
+  RendezvousWorld world(options);
+  // What a phasing on the ground's orbits leaves, of which the chaser is told nothing.
+  const RelativeElements& start_m = options.roe_m;
+  world.spacecraft("chaser")
+      .disperse("roe/da_m", Normal{start_m.da, 5})
+      .disperse("roe/dl_m", Normal{start_m.dl, 500})
+      .disperse("roe/dex_m", Normal{start_m.dex, 30})
+      .disperse("roe/dey_m", Normal{start_m.dey, 30})
+      .disperse("roe/dix_m", Normal{start_m.dix, 30})
+      .disperse("roe/diy_m", Normal{start_m.diy, 30});
   world.command(20min, RPO_KIT_GO);
   double first_h = 0;
   std::size_t next = 0;
@@ -51,10 +61,15 @@ void fly_far_range(RunId run) {
   int judged = 0;
   const bool arrived = world.run_until(
       [&] {
-        if (first_h == 0 && world.mode == RPO_KIT_MODE_APPROACHING) first_h = world.hours();
         if (world.beliefs.empty()) return false;
         const RendezvousWorld::Belief& now = world.beliefs.back();
         const double range_m = norm(now.r_m);
+        if (first_h == 0 && world.mode == RPO_KIT_MODE_APPROACHING) {
+          first_h = world.hours();
+          world.record_metric("error_percent_at_start", 100 * now.range_error_m() / range_m);
+          world.record_metric("sigma_percent_at_start", 100 * now.range_sigma_m() / range_m);
+          world.record_metric("start_m", range_m);
+        }
         while (next < kJudged_m.size() && range_m < kJudged_m[next]) {
           const double error = now.range_error_m(), sigma = now.range_sigma_m();
           world.record_metric(at_range("error_percent", kJudged_m[next]), 100 * error / range_m);
@@ -79,12 +94,16 @@ void fly_far_range(RunId run) {
 
 }  // namespace
 
-// Required: 3 % of the range (1 sigma) over 20 seeds, and a covariance that says so: the normalised
-// error is 1, from 20 seeds and eight ranges that repeat each other in part 1 +- 0.2.
+// Required: from 30 km to 2 km 3 % of the range (1 sigma) over 20 seeds, and a covariance that says
+// so: the normalised error is 1, from 20 seeds and nine ranges that repeat each other in part 1 +-
+// 0.2.
 TEST(RendezvousFarRangeCampaign, DirectionsAndBurnsShowTheRange) {
   const int runs = flags().runs.value_or(1);
   const Campaign campaign = fly_campaign(Runs{runs}, fly_far_range);
   EXPECT_EQ(campaign.passed().passed, campaign.passed().runs);
+  std::printf("before any burn, %.0f m: range error %.2f %%, sigma %.2f %%\n",
+              campaign.metric("start_m").mean(), rms(campaign.metric("error_percent_at_start")),
+              campaign.metric("sigma_percent_at_start").mean());
   for (const double range_m : kJudged_m) {
     const double error = rms(campaign.metric(at_range("error_percent", range_m)));
     std::printf("%6.0f m: range error %.2f %%, sigma %.2f %%\n", range_m, error,

@@ -65,15 +65,31 @@ bool Approach::plan_leg(const RelativeOrbit& now, std::int64_t end_ns, double sp
   return true;
 }
 
+// With the range as badly known as that a leg would miss: its burns are in proportion to it.
+bool Approach::observe(const RelativeOrbit& now, const Matrix6& covariance, double spread_m) {
+  const ObservabilityOptions& options = options_.observability;
+  if (observed_ == options.most || !(range_fraction(now, covariance) > options.range_known)) {
+    return false;
+  }
+  const double keep_out_m = options_.transfer.keep_out_m + spread_m;
+  if (!plan_observation(now, keep_out_m, options_.burn_error, options, &transfer_)) return false;
+  phase_ = ApproachPhase::kObserving;
+  next_burn_ = 0;
+  ++observations_;
+  ++observed_;
+  return true;
+}
+
 void Approach::begin_leg(const RelativeOrbit& now, const Matrix6& covariance) {
   const Waypoint& waypoint = options_.plan.waypoints[waypoint_];
   const double margin_m = uncertain_safe_m(now, covariance, options_.go_sigmas);
   if (margin_m < options_.transfer.keep_out_m) return;
   const std::int64_t end_ns = now.t_ns + revolutions_ns(now.chief, waypoint.leg_rev);
-  const double spread_m = uncertain_safe_m(now, Matrix6(), 0.0) - margin_m;
-  if (!plan_leg(now, end_ns, std::max(0.0, spread_m))) return;
+  const double spread_m = std::max(0.0, uncertain_safe_m(now, Matrix6(), 0.0) - margin_m);
+  if (observe(now, covariance, spread_m)) return;
+  if (!plan_leg(now, end_ns, spread_m)) return;
   phase_ = ApproachPhase::kLeg;
-  next_burn_ = 0;
+  next_burn_ = observed_ = 0;
   ++legs_;
 }
 
@@ -82,7 +98,9 @@ void Approach::end_leg(const RelativeOrbit& now) {
     phase_ = ApproachPhase::kAborted;
     return;
   }
+  const bool observed = phase_ == ApproachPhase::kObserving;
   phase_ = ApproachPhase::kWaiting;
+  if (observed) return;
   if (!reached(now)) {
     if (passed(now)) ++waypoint_;
     return;
@@ -97,17 +115,21 @@ void Approach::end_leg(const RelativeOrbit& now) {
   hold_until_ns_ = now.t_ns + revolutions_ns(now.chief, waypoint.hold_rev);
 }
 
+bool Approach::flying() const {
+  return phase_ == ApproachPhase::kLeg || phase_ == ApproachPhase::kObserving ||
+         phase_ == ApproachPhase::kAborting;
+}
+
 bool Approach::decide(const RelativeOrbit& now, const Matrix6& covariance, double lead_s,
                       Burn* burn) {
-  const bool flying = phase_ == ApproachPhase::kLeg || phase_ == ApproachPhase::kAborting;
-  if (flying && next_burn_ == transfer_.count && now.t_ns >= transfer_.end_ns) end_leg(now);
+  if (flying() && next_burn_ == transfer_.count && now.t_ns >= transfer_.end_ns) end_leg(now);
   if (phase_ == ApproachPhase::kHolding && now.t_ns >= hold_until_ns_) {
     phase_ = ApproachPhase::kWaiting;
   }
   // Arrived, it stays: J2 and errors move it off, and the last leg brings it back.
   if (phase_ == ApproachPhase::kArrived && !reached(now)) phase_ = ApproachPhase::kWaiting;
   if (phase_ == ApproachPhase::kWaiting && !held_) begin_leg(now, covariance);
-  if (phase_ != ApproachPhase::kLeg && phase_ != ApproachPhase::kAborting) return false;
+  if (!flying()) return false;
   if (next_burn_ == transfer_.count) return false;
   const Burn& next = transfer_.burns[next_burn_];
   if (next.t_ns - now.t_ns > nanoseconds(lead_s)) return false;
@@ -132,7 +154,9 @@ bool Approach::abort(const RelativeOrbit& now) {
 
 void Approach::hold() {
   held_ = true;
-  if (phase_ == ApproachPhase::kLeg) phase_ = ApproachPhase::kWaiting;
+  if (phase_ == ApproachPhase::kLeg || phase_ == ApproachPhase::kObserving) {
+    phase_ = ApproachPhase::kWaiting;
+  }
 }
 
 void Approach::resume(const RelativeOrbit& now) {

@@ -4,10 +4,13 @@
 ///             leg starts from what navigation then says, so that errors of execution and of the
 ///             first order do not add up. A leg that misses its waypoint is flown again, unless it
 ///             has led past it: then the next one follows. Before each leg the estimate must be
-///             good enough: otherwise it waits where it is, which is safe.
+///             good enough: otherwise it waits where it is, which is safe. Where only the range is
+///             not, it first makes it observable (observability.hpp): a burn, and two revolutions
+///             of watching what it did.
 /// Checked by  test_suites/unit/flight_sw/rpo_kit/guidance_test.cpp
 #pragma once
 
+#include "rpo_kit/guidance/observability.hpp"
 #include "rpo_kit/guidance/safe_orbits.hpp"
 
 namespace rpo_kit {
@@ -32,6 +35,7 @@ struct ApproachPlan {
 
 struct ApproachOptions {
   TransferOptions transfer = {};
+  ObservabilityOptions observability = {};
   ApproachPlan plan = {};
   double tolerance = 0.25;  ///< of a waypoint, as a part of its radius or of 5 % of its distance
   double go_sigmas = 3.0;   ///< no leg begins below keep-out with that margin
@@ -41,7 +45,7 @@ struct ApproachOptions {
   double abort_radius_m = 200.0, abort_drift_m = 20.0;
 };
 
-enum class ApproachPhase { kWaiting, kLeg, kHolding, kArrived, kAborting, kAborted };
+enum class ApproachPhase { kWaiting, kObserving, kLeg, kHolding, kArrived, kAborting, kAborted };
 
 class Approach {
  public:
@@ -65,6 +69,8 @@ class Approach {
   ApproachPhase phase() const { return phase_; }
   int waypoint() const { return waypoint_; }
   int legs() const { return legs_; }
+  /// Burns for the range, in all.
+  int observations() const { return observations_; }
   double delta_v_mps() const { return delta_v_mps_; }
   const Transfer& transfer() const { return transfer_; }
 
@@ -73,6 +79,9 @@ class Approach {
   bool reached(const flight_support::RelativeOrbit& now) const;
   bool passed(const flight_support::RelativeOrbit& now) const;
   bool plan_leg(const flight_support::RelativeOrbit& now, std::int64_t end_ns, double spread_m);
+  bool observe(const flight_support::RelativeOrbit& now, const flight_support::Matrix6& covariance,
+               double spread_m);
+  bool flying() const;
   void begin_leg(const flight_support::RelativeOrbit& now,
                  const flight_support::Matrix6& covariance);
   void end_leg(const flight_support::RelativeOrbit& now);
@@ -81,6 +90,7 @@ class Approach {
   ApproachPhase phase_ = ApproachPhase::kWaiting;
   Transfer transfer_;
   int next_burn_ = 0, waypoint_ = 0, legs_ = 0;
+  int observations_ = 0, observed_ = 0;  // in all, and since the last leg
   std::int64_t hold_until_ns_ = 0;
   bool held_ = false, has_phase_ = false;
   double phase_rad_ = 0.0, delta_v_mps_ = 0.0;

@@ -40,6 +40,7 @@ class Reader final : public flight_support::ConfigurationReader {
         {"burn_error_fraction", &c.navigation.burn_fraction, 0.0, 1.0},
         {"burn_error_rad", &c.navigation.burn_direction_rad, 0.0, 1.0},
         {"keep_out_m", &c.approach.transfer.keep_out_m, 0.0, 1e4},
+        {"range_known", &c.approach.observability.range_known, 1e-3, 1.0},
         {"abort_radius_m", &c.approach.abort_radius_m, 10.0, 1e4},
         {"abort_m", &c.autonomy.abort_m, 0.0, 1e4},
         {"hold_limit_s", &c.autonomy.hold_limit_s, 60.0, 1e7},
