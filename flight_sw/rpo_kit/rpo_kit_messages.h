@@ -5,6 +5,11 @@
  *   bearing, a processor of images -> chaser: where the target is among the stars
  *     0 i64 exposure_ns, of its middle | 8 f64 direction_ECI[3], a unit vector, geometric
  *     | 32 f64 sigma_rad, per axis
+ *   observation, a second observer -> chaser over a crosslink: where the target was seen, and from
+ *   where. May be late, doubled, overtaken or lost: each stands for itself, by its time.
+ *     0 i64 exposure_ns, of its middle | 8 f64 r_ECI[3] m, of the observer then
+ *     | 32 f64 covariance_ECI[6] m^2: xx, xy, xz, yy, yz, zz | 80 f64 direction_ECI[3], a unit
+ *     vector, geometric | 104 f64 sigma_rad, per axis | 112 u32 crc
  *   keypoints, a processor of images -> chaser
  *     0 i64 exposure_ns, of its middle | 8 f64 q_CI[4], the camera's attitude
  *     | 40 f64 attitude_sigma_rad, per axis | 48 u32 count, at most 32
@@ -25,6 +30,7 @@
  *     0 i64 t_ns | 8 u32 mode | 12 u32 waypoint | 16 f64 a_roe_m[6] | 64 f64 sigma_m[6]
  *     | 112 f64 delta_v_mps | 120 u32 burns | 124 u32 used[3]: GNSS, directions, poses
  *     | 136 u32 outliers | 140 u32 restarts | 144 u32 rejected
+ *     | 148 u32 used of the second observer
  *     a_roe of the chaser relative to the target, mean, order da, dl, dex, dey, dix, diy; zero
  *     while there is no estimate.
  *
@@ -37,7 +43,7 @@
 #include "orrery_messages.h"
 
 #define RPO_KIT_COMMAND_BYTES 5u
-#define RPO_KIT_TELEMETRY_BYTES 148u
+#define RPO_KIT_TELEMETRY_BYTES 152u
 #define RPO_KIT_KEYPOINT_BYTES 28u
 #define RPO_KIT_MOST_KEYPOINTS 32u
 #define RPO_KIT_KEYPOINTS_HEAD_BYTES 52u
@@ -45,6 +51,7 @@
   (RPO_KIT_KEYPOINTS_HEAD_BYTES + RPO_KIT_MOST_KEYPOINTS * RPO_KIT_KEYPOINT_BYTES)
 #define RPO_KIT_BEARING_BYTES 40u
 #define RPO_KIT_VIEW_HEAD_BYTES 40u
+#define RPO_KIT_OBSERVATION_BYTES 116u
 #define RPO_KIT_TARGET_BYTES 104u
 #define RPO_KIT_IMAGING_BYTES 124u
 
@@ -67,7 +74,7 @@ typedef struct rpo_kit_telemetry {
   uint32_t mode, waypoint;
   double a_roe_m[6], sigma_m[6];
   double delta_v_mps; /* commanded since boot */
-  uint32_t burns, used[3], outliers, restarts, rejected;
+  uint32_t burns, used[3], outliers, restarts, rejected, used_second;
 } rpo_kit_telemetry;
 
 ORRERY_MAYBE_UNUSED static void rpo_kit_put_command(unsigned char* message, unsigned order) {
@@ -99,6 +106,7 @@ ORRERY_MAYBE_UNUSED static void rpo_kit_put_telemetry(unsigned char* message,
   orrery_put_u32(message + 136, t->outliers);
   orrery_put_u32(message + 140, t->restarts);
   orrery_put_u32(message + 144, t->rejected);
+  orrery_put_u32(message + 148, t->used_second);
 }
 
 /* 1 if the length is right; otherwise 0, and nothing is written. */
@@ -117,6 +125,7 @@ ORRERY_MAYBE_UNUSED static int rpo_kit_get_telemetry(const unsigned char* messag
   t->outliers = orrery_get_u32(message + 136);
   t->restarts = orrery_get_u32(message + 140);
   t->rejected = orrery_get_u32(message + 144);
+  t->used_second = orrery_get_u32(message + 148);
   return 1;
 }
 
@@ -124,6 +133,11 @@ typedef struct rpo_kit_bearing {
   int64_t exposure_ns;
   double direction_ECI[3], sigma_rad;
 } rpo_kit_bearing;
+
+typedef struct rpo_kit_observation {
+  int64_t exposure_ns;
+  double r_ECI[3], covariance_ECI[6], direction_ECI[3], sigma_rad;
+} rpo_kit_observation;
 
 typedef struct rpo_kit_keypoint {
   uint32_t point;
@@ -195,6 +209,29 @@ ORRERY_MAYBE_UNUSED static int rpo_kit_get_bearing(const unsigned char* message,
   b->exposure_ns = orrery_get_i64(message);
   orrery_get_f64s(message + 8, b->direction_ECI, 3);
   b->sigma_rad = orrery_get_f64(message + 32);
+  return 1;
+}
+
+ORRERY_MAYBE_UNUSED static void rpo_kit_put_observation(unsigned char* message,
+                                                        const rpo_kit_observation* o) {
+  orrery_put_i64(message, o->exposure_ns);
+  orrery_put_f64s(message + 8, o->r_ECI, 3);
+  orrery_put_f64s(message + 32, o->covariance_ECI, 6);
+  orrery_put_f64s(message + 80, o->direction_ECI, 3);
+  orrery_put_f64(message + 104, o->sigma_rad);
+  orrery_put_u32(message + 112, orrery_crc32(message, 112));
+}
+
+/* 1 if the length and the CRC are right; otherwise 0, and nothing is written. */
+ORRERY_MAYBE_UNUSED static int rpo_kit_get_observation(const unsigned char* message, uint32_t bytes,
+                                                       rpo_kit_observation* o) {
+  if (bytes != RPO_KIT_OBSERVATION_BYTES) return 0;
+  if (orrery_get_u32(message + 112) != orrery_crc32(message, 112)) return 0;
+  o->exposure_ns = orrery_get_i64(message);
+  orrery_get_f64s(message + 8, o->r_ECI, 3);
+  orrery_get_f64s(message + 32, o->covariance_ECI, 6);
+  orrery_get_f64s(message + 80, o->direction_ECI, 3);
+  o->sigma_rad = orrery_get_f64(message + 104);
   return 1;
 }
 

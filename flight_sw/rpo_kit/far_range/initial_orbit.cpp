@@ -100,7 +100,8 @@ class BatchFit {
   BatchFit(const Arc& arc, const BatchOptions& options) : arc_(arc), options_(options) {
     for (int k = 0; k < arc.count; ++k) {
       planes_.emplace_back(arc.measurements[k].bearing.direction_ECI);
-      from_.push_back(position_ECI(arc.measurements[k].observer.mean));
+      from_.push_back(position_ECI(arc.measurements[k].observer.mean) +
+                      arc.measurements[k].bearing.r_SO_ECI);
     }
   }
 

@@ -8,6 +8,7 @@
 ///             covariance.
 /// Range       Shows by the curvature of the orbit (30 km: 2 mrad), by a*da that lets the scale of
 ///             the pattern grow, and, best, by burns.
+///             With directions of a second observer it shows at once.
 /// Valid for   arcs of half a revolution and more, 200 m to 200 km, two burns of the observer.
 /// Checked by  test_suites/unit/flight_sw/rpo_kit/relative_orbit_filter_test.cpp
 #pragma once
@@ -38,7 +39,10 @@ struct InitialOrbit {
 
 constexpr int kMostBatchBurns = 2;
 
-/// @param measurements  By ascending time. @param burns  Of the observer within the arc, ascending.
+/// @param measurements  By ascending time, the observer's own first; those of a second observer
+/// with
+///                      a sigma that has its place's in it. @param burns  Of the observer within
+///                      the arc, ascending.
 /// @return false: fewer than six bearings, more burns than kMostBatchBurns, or no fit.
 bool solve_initial_orbit(const BatchMeasurement* measurements, int count, const ObserverBurn* burns,
                          int burn_count, const BatchOptions& options, InitialOrbit* result);

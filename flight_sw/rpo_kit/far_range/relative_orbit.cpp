@@ -47,6 +47,19 @@ Vec3 target_position_ECI(const OrbitElements& observer, const Vec3& observer_r_E
   return position_ECI(apply_relative_elements(observer, a_roe)) - observer_r_ECI;
 }
 
+bool intersect(const Vec3& first, const Vec3& second, const Vec3& r_ECI, Intersection* at) {
+  const Vec3 normal = cross(first, second);
+  at->sine = norm(normal);
+  if (!(at->sine > 0.0)) return false;
+  const double c = dot(first, second), s2 = at->sine * at->sine;
+  const double along_first = dot(r_ECI, first), along_second = dot(r_ECI, second);
+  at->first_m = (along_first - c * along_second) / s2;
+  at->second_m = (c * along_first - along_second) / s2;
+  at->across = (1.0 / at->sine) * normal;
+  at->miss_m = std::fabs(dot(at->across, r_ECI));
+  return true;
+}
+
 TangentPlane::TangentPlane(const Vec3& direction_ECI)
     : normal((1.0 / norm(direction_ECI)) * direction_ECI) {
   const Vec3 axis = std::fabs(normal[2]) < 0.7 ? vec3(0, 0, 1) : vec3(1, 0, 0);
@@ -64,6 +77,17 @@ Vector<2> TangentPlane::offset(const Vec3& towards) const {
   z[0] = scale * dot(first, towards);
   z[1] = scale * dot(second, towards);
   return z;
+}
+
+Matrix<2, 2> TangentPlane::spread(const Mat3& covariance, double length) const {
+  const Vec3 axes[2] = {first, second};
+  Matrix<2, 2> variances;
+  for (int r = 0; r < 2; ++r) {
+    for (int c = 0; c < 2; ++c) {
+      variances(r, c) = dot(axes[r], covariance * axes[c]) / (length * length);
+    }
+  }
+  return variances;
 }
 
 }  // namespace rpo_kit

@@ -56,18 +56,35 @@ flight_support::Vec3 target_position_ECI(const flight_support::OrbitElements& ob
 /// The observer's position that belongs to its mean elements [m].
 flight_support::Vec3 position_ECI(const flight_support::OrbitElements& mean);
 
-/// Where the camera saw the target.
+/// Where a camera saw the target: the observer's own, or that of a second observer whose place is
+/// known beside it.
 struct Bearing {
   std::int64_t t_ns = 0;
   flight_support::Vec3 direction_ECI;  ///< unit vector, geometric (stars' aberration removed)
   double sigma_rad = 0.0;              ///< 1-sigma per axis
+  flight_support::Vec3 r_SO_ECI = {};  ///< the camera's spacecraft less the observer [m]
+  flight_support::Mat3 covariance_SO_ECI = {};  ///< of that [m^2]
+  bool is_own() const { return dot(r_SO_ECI, r_SO_ECI) == 0.0; }
 };
+
+/// Where two lines of sight pass each other, in closed form.
+struct Intersection {
+  double first_m = 0.0, second_m = 0.0;  ///< from the cameras, below 0 behind them
+  double miss_m = 0.0;                   ///< between the lines there, across both
+  flight_support::Vec3 across;           ///< unit vector of that
+  double sine = 0.0;                     ///< of the angle between the lines
+};
+/// @param r_ECI  The second camera less the first. @return false: parallel.
+bool intersect(const flight_support::Vec3& first, const flight_support::Vec3& second,
+               const flight_support::Vec3& r_ECI, Intersection* at);
 
 /// Two unit vectors across a direction: residuals are measured along them.
 struct TangentPlane {
   explicit TangentPlane(const flight_support::Vec3& direction_ECI);
   /// Of a vector of any length, seen along the plane's normal [rad, for small angles].
   flight_support::Vector<2> offset(const flight_support::Vec3& towards) const;
+  /// Variances [rad^2] of that for a vector with this covariance.
+  flight_support::Matrix<2, 2> spread(const flight_support::Mat3& covariance, double length) const;
   flight_support::Vec3 normal, first, second;
 };
 

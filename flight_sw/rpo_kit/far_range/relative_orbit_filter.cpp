@@ -173,7 +173,7 @@ bool RelativeOrbitFilter::absorb(const Residual& residual, const Matrix<M, M>& n
 bool RelativeOrbitFilter::update(const Bearing& bearing, const Observer& observer) {
   if (!(bearing.sigma_rad > 0.0) || !ready(bearing.t_ns, observer)) return false;
   const TangentPlane plane(bearing.direction_ECI);
-  const Vec3 from = position_ECI(observer.mean);
+  const Vec3 from = position_ECI(observer.mean) + bearing.r_SO_ECI;
   // Half the sky away, the points would scatter about the pole and seem uncertain enough.
   const Vec3 expected = target_position_ECI(observer.mean, from, a_roe_);
   if (!(dot(plane.normal, expected) > 0.7 * norm(expected))) {
@@ -184,7 +184,9 @@ bool RelativeOrbitFilter::update(const Bearing& bearing, const Observer& observe
       [&](const RelativeElements& a_roe) {
         return plane.offset(target_position_ECI(observer.mean, from, a_roe));
       },
-      bearing.sigma_rad * bearing.sigma_rad * identity<2>(), kGate2);
+      bearing.sigma_rad * bearing.sigma_rad * identity<2>() +
+          plane.spread(bearing.covariance_SO_ECI, norm(expected)),
+      kGate2);
 }
 
 bool RelativeOrbitFilter::update(const PlaceMeasurement& place, const Observer& observer) {

@@ -7,7 +7,8 @@
 ///             elements, with the non-linear motion and directions of relative_orbit.hpp.
 ///             Burns of the observer move the state by what is known of them and widen it by what
 ///             is not. Residuals in the tangent plane of the measured direction: no angle has a
-///             pole.
+///             pole. Those of a second observer are seen from where it is, and the covariance of
+///             that, over the range, is added to their noise.
 /// Noise       Random relative acceleration, white, of one strength per axis of RTN, adapted to the
 ///             state's corrections (adaptive state noise compensation, Stacey & D'Amico, IEEE TAES
 ///             57(5), 2021) within given limits.

@@ -11,8 +11,15 @@ using namespace flight_support;
 
 namespace {
 
-constexpr std::size_t kMostWaiting = 256, kMostBatch = 60;
+constexpr std::size_t kMostWaiting = 256, kMostSecond = 32, kMostBatch = 60;
 constexpr int kOutliersToRestart = 30;
+// Chi-square with one degree of freedom at 1 - 3e-4, as the filter's gates.
+constexpr double kGate1 = 13.1;
+// In sigma: lines of sight that are nearer to parallel tell too little of the range to start from.
+constexpr double kLeastAngle = 10.0;
+constexpr int kLeastSecond = 6;
+// Of the batch, over 1-sigma: more, and the second observer sees something else.
+constexpr double kMostResidual = 3.0;
 
 Vec3 dv_in_RTN(const OrbitElements& mean, const Vec3& dv_ECI) {
   return eci_to_rtn(state_from_osculating(osculating_from_mean(mean))) * dv_ECI;
@@ -74,6 +81,23 @@ void RelativeNavigation::pose(const PlaceMeasurement& place) {
   insert(event);
 }
 
+void RelativeNavigation::second_bearing(const SecondBearing& bearing) {
+  std::size_t waiting = 0;
+  for (const Event& event : waiting_) {
+    if (event.kind != Kind::kSecond) continue;
+    ++waiting;
+    if (event.t_ns == bearing.t_ns || waiting == kMostSecond) {
+      ++dropped_;
+      return;
+    }
+  }
+  Event event;
+  event.t_ns = bearing.t_ns;
+  event.kind = Kind::kSecond;
+  event.second = bearing;
+  insert(event);
+}
+
 void RelativeNavigation::burn(std::int64_t t_ns, const Vec3& dv_ECI) {
   Event event;
   event.t_ns = t_ns;
@@ -103,6 +127,8 @@ void RelativeNavigation::use(const Event& event) {
       return use_target_fix(event.fix);
     case Kind::kBearing:
       return use_bearing(event.bearing);
+    case Kind::kSecond:
+      return use_second(event.second);
     default:
       if (!filter_.started()) return;
       own_ = propagate(own_, event.t_ns);
@@ -142,21 +168,28 @@ void RelativeNavigation::use_burn(const Event& event) {
   own_.mean = after_burn(own_.mean, dv_RTN);
 }
 
+// The last own fix, moved to that instant. Its velocity's noise moves it, too.
+bool RelativeNavigation::own_raw(std::int64_t t_ns, StateEci* own, double* sigma_r_m) const {
+  const double apart_s = seconds(t_ns - raw_.t_ns);
+  if (std::fabs(apart_s) > options_.pairing_s) return false;
+  *own = raw_.state;
+  if (apart_s != 0.0) {
+    const Observer then = propagate(observer_from_state(raw_.t_ns, raw_.state), t_ns);
+    *own = state_from_osculating(osculating_from_mean(then.mean));
+  }
+  *sigma_r_m = std::hypot(raw_.sigma_r_m, raw_.sigma_v_mps * apart_s);
+  return true;
+}
+
 // Both fixes at the target's instant.
 bool RelativeNavigation::difference(const EciFix& target, StateMeasurement* state) const {
-  const double apart_s = seconds(target.t_ns - raw_.t_ns);
-  if (std::fabs(apart_s) > options_.pairing_s) return false;
-  StateEci own = raw_.state;
-  if (apart_s != 0.0) {
-    const Observer then = propagate(observer_from_state(raw_.t_ns, raw_.state), target.t_ns);
-    own = state_from_osculating(osculating_from_mean(then.mean));
-  }
+  StateEci own;
+  double sigma_r_m = 0.0;
+  if (!own_raw(target.t_ns, &own, &sigma_r_m)) return false;
   state->t_ns = target.t_ns;
   state->r_TO_ECI = target.state.r_ECI - own.r_ECI;
   state->v_TO_ECI = target.state.v_ECI - own.v_ECI;
-  // The own velocity's noise moves the own position meanwhile.
-  state->sigma_r_m =
-      std::hypot(std::hypot(raw_.sigma_r_m, raw_.sigma_v_mps * apart_s), target.sigma_r_m);
+  state->sigma_r_m = std::hypot(sigma_r_m, target.sigma_r_m);
   state->sigma_v_mps = std::hypot(raw_.sigma_v_mps, target.sigma_v_mps);
   return true;
 }
@@ -212,21 +245,93 @@ void RelativeNavigation::use_bearing(const Bearing& bearing) {
   if (filter_.started() && filter_.healthy()) {
     return count(filter_.update(bearing, own_), Source::kBearing, bearing.t_ns);
   }
-  // When there is no more room every other one goes: the arc is what counts.
+  collect(bearing);
+}
+
+void RelativeNavigation::use_second(const SecondBearing& second) {
+  StateEci raw;
+  double sigma_r_m = 0.0;
+  if (!own_raw(second.t_ns, &raw, &sigma_r_m)) {
+    ++dropped_;
+    return;
+  }
+  own_ = propagate(own_, second.t_ns);
+  Bearing bearing{second.t_ns, second.direction_ECI, second.sigma_rad, second.r_ECI - raw.r_ECI,
+                  second.covariance_ECI + sigma_r_m * sigma_r_m * identity<3>()};
+  if (!filter_.started() || !filter_.healthy()) {
+    if (may_start_with(&bearing)) return collect(bearing);
+    ++outliers_;
+    return;
+  }
+  const bool accepted = filter_.update(bearing, own_);
+  if (accepted || !filter_.healthy()) return count(accepted, Source::kSecond, second.t_ns);
+  ++outliers_;
+}
+
+// The batch has no gate: there the own line of sight, turned with the orbit to the same instant,
+// and the other one have to meet. Their place's noise becomes one of the direction.
+bool RelativeNavigation::may_start_with(Bearing* bearing) const {
+  const BatchMeasurement* own = nullptr;
+  for (const BatchMeasurement& m : batch_) {
+    const double apart_s = std::fabs(seconds(m.bearing.t_ns - bearing->t_ns));
+    if (m.bearing.is_own() && apart_s <= options_.pairing_s) own = &m;
+  }
+  if (own == nullptr) return false;
+  const auto axes = [](const Observer& at) {
+    return eci_to_rtn(state_from_osculating(osculating_from_mean(at.mean)));
+  };
+  const Vec3 direction = transpose(axes(own_)) * (axes(own->observer) * own->bearing.direction_ECI);
+  Intersection at;
+  if (!intersect(direction, bearing->direction_ECI, bearing->r_SO_ECI, &at)) return false;
+  if (at.sine < kLeastAngle * std::hypot(own->bearing.sigma_rad, bearing->sigma_rad)) return false;
+  const double first = own->bearing.sigma_rad * at.first_m;
+  const double second = bearing->sigma_rad * at.second_m;
+  const double variance =
+      first * first + second * second + dot(at.across, bearing->covariance_SO_ECI * at.across);
+  if (!(at.first_m > 0.0 && at.second_m > 0.0) || !(at.miss_m * at.miss_m < kGate1 * variance)) {
+    return false;
+  }
+  const Mat3& P = bearing->covariance_SO_ECI;
+  const double place_m = std::sqrt((P(0, 0) + P(1, 1) + P(2, 2)) / 3.0);
+  bearing->sigma_rad = std::hypot(bearing->sigma_rad, place_m / at.second_m);
+  return true;
+}
+
+int RelativeNavigation::others_in_batch() const {
+  return static_cast<int>(std::count_if(
+      batch_.begin(), batch_.end(), [](const BatchMeasurement& m) { return !m.bearing.is_own(); }));
+}
+
+void RelativeNavigation::collect(const Bearing& bearing) {
+  // When there is no more room every other one of each observer goes: the arc is what counts.
   if (batch_.size() == kMostBatch) {
-    for (std::size_t k = 1; 2 * k < kMostBatch; ++k) batch_[k] = batch_[2 * k];
-    batch_.resize(kMostBatch / 2);
+    bool keep[2] = {false, false};
+    std::size_t kept = 0;
+    for (const BatchMeasurement& m : batch_) {
+      bool& this_one = keep[m.bearing.is_own() ? 0 : 1];
+      this_one = !this_one;
+      if (this_one) batch_[kept++] = m;
+    }
+    batch_.resize(kept);
   }
   batch_.push_back({bearing, own_});
   const double arc_s = seconds(bearing.t_ns - batch_.front().bearing.t_ns);
+  const double enough_s =
+      others_in_batch() >= kLeastSecond ? options_.second_arc_s : options_.batch_arc_s;
   // Each time the arc has grown by an eighth, so that a hopeless one costs little.
-  if (arc_s > options_.batch_arc_s && batch_.size() >= 12 && batch_.size() % 8 == 0) try_batch();
+  if (arc_s > enough_s && batch_.size() >= 12 && batch_.size() % 8 == 0) try_batch();
 }
 
 void RelativeNavigation::try_batch() {
   InitialOrbit initial;
   if (!solve_initial_orbit(batch_.data(), static_cast<int>(batch_.size()), batch_burns_.data(),
                            static_cast<int>(batch_burns_.size()), options_.batch, &initial)) {
+    return;
+  }
+  if (initial.residual > kMostResidual && others_in_batch() > 0) {
+    batch_.erase(std::remove_if(batch_.begin(), batch_.end(),
+                                [](const BatchMeasurement& m) { return !m.bearing.is_own(); }),
+                 batch_.end());
     return;
   }
   const double sigma = std::sqrt(initial.covariance(kDl, kDl));
@@ -266,7 +371,7 @@ bool RelativeNavigation::own_at(std::int64_t t_ns, Observer* own) const {
 
 bool RelativeNavigation::at(std::int64_t t_ns, RelativeOrbit* chaser, Matrix6* covariance) const {
   if (!started()) return false;
-  const std::int64_t last_ns = std::max({last_ns_[0], last_ns_[1], last_ns_[2]});
+  const std::int64_t last_ns = *std::max_element(last_ns_, last_ns_ + kSources);
   if (seconds(t_ns - last_ns) > options_.lost_s) return false;
   RelativeOrbitFilter ahead = filter_;
   Observer own = own_.t_ns >= ahead.observer().t_ns ? own_ : ahead.observer();

@@ -5,6 +5,11 @@
 ///             from a GNSS difference, or from directions alone by the batch. What arrives is
 ///             sorted by its own time for `lag_s` before it is used: late messages, transferred
 ///             images and burns then count in the order in which they happened.
+/// Second      Directions that another spacecraft measured are seen from where it is: its GNSS
+///             position less the own raw fix, so that what the model of the orbits leaves is in
+///             neither. They start the filter, too, once two lines of sight that pass each other
+///             agree. Outside the gate they are not used, and never restart the filter: to that
+///             only the own sensors are trusted.
 /// Own orbit   Mean elements, smoothed over GNSS fixes; differences of GNSS use the raw fixes.
 /// Output      a_roe of the CHASER relative to the TARGET, as guidance wants it. Turning the
 ///             relation round changes the sign; what else it changes is a_roe/a of the covariance,
@@ -21,17 +26,18 @@
 
 namespace rpo_kit {
 
-enum class Source { kGnss, kBearing, kPose };
-constexpr int kSources = 3;
+enum class Source { kGnss, kBearing, kPose, kSecond };
+constexpr int kSources = 4;
 
 struct NavigationOptions {
   RelativeOrbitFilterOptions filter = {};
   BatchOptions batch = {};
-  double lag_s = 30.0;          ///< how late a message may be and still be used
-  double pairing_s = 6.0;       ///< between the two fixes of a GNSS difference
-  double batch_arc_s = 8000.0;  ///< of directions before the first solution is tried
-  double batch_accuracy = 0.3;  ///< 1-sigma of the range that is good enough to start
-  double lost_s = 3600.0;       ///< without any measurement the estimate is none
+  double lag_s = 30.0;           ///< how late a message may be and still be used
+  double pairing_s = 6.0;        ///< between the two fixes of a GNSS difference
+  double batch_arc_s = 8000.0;   ///< of directions before the first solution is tried
+  double second_arc_s = 1500.0;  ///< the same if a second observer's are among them
+  double batch_accuracy = 0.3;   ///< 1-sigma of the range that is good enough to start
+  double lost_s = 3600.0;        ///< without any measurement the estimate is none
   double burn_fraction = 0.02, burn_direction_rad = 0.01;  ///< 1-sigma of a burn's execution
   double own_memory = 30.0;  ///< fixes over which the own orbit is smoothed
 };
@@ -43,6 +49,15 @@ struct EciFix {
   double sigma_r_m = 0.0, sigma_v_mps = 0.0;  ///< 1-sigma per axis
 };
 
+/// Where another spacecraft saw the target, and where that one was.
+struct SecondBearing {
+  std::int64_t t_ns = 0;
+  flight_support::Vec3 direction_ECI;  ///< unit vector, geometric
+  double sigma_rad = 0.0;              ///< 1-sigma per axis
+  flight_support::Vec3 r_ECI;          ///< [m]
+  flight_support::Mat3 covariance_ECI;
+};
+
 class RelativeNavigation {
  public:
   explicit RelativeNavigation(const NavigationOptions& options = {});
@@ -50,6 +65,8 @@ class RelativeNavigation {
   void own_fix(const EciFix& fix);
   void target_fix(const EciFix& fix);
   void bearing(const Bearing& bearing);
+  /// One per instant; those that wait are few, so that a flood drops itself alone.
+  void second_bearing(const SecondBearing& bearing);
   void pose(const PlaceMeasurement& place);
   /// A start from a track of poses, where nothing else has started it; otherwise nothing happens.
   /// @param covariance_RTN  Of position and inertial velocity, in axes of RTN.
@@ -75,12 +92,13 @@ class RelativeNavigation {
   int dropped() const { return dropped_; }
 
  private:
-  enum class Kind { kBurn, kOwnFix, kTargetFix, kBearing, kPose };
+  enum class Kind { kBurn, kOwnFix, kTargetFix, kBearing, kPose, kSecond };
   struct Event {
     std::int64_t t_ns = 0;
     Kind kind = Kind::kOwnFix;
     EciFix fix;
     Bearing bearing;
+    SecondBearing second;
     PlaceMeasurement place;
     flight_support::Vec3 dv_ECI;
   };
@@ -90,8 +108,13 @@ class RelativeNavigation {
   void use_own_fix(const EciFix& fix);
   void use_target_fix(const EciFix& fix);
   void use_bearing(const Bearing& bearing);
+  void use_second(const SecondBearing& second);
+  bool may_start_with(Bearing* bearing) const;
+  void collect(const Bearing& bearing);
+  int others_in_batch() const;
   void use_burn(const Event& event);
   void count(bool accepted, Source source, std::int64_t t_ns);
+  bool own_raw(std::int64_t t_ns, flight_support::StateEci* own, double* sigma_r_m) const;
   bool difference(const EciFix& target, StateMeasurement* state) const;
   void start_from(const StateMeasurement& state, const EciFix& target, const Observer& own);
   void start_at(const Observer& own, const flight_support::StateEci& target,

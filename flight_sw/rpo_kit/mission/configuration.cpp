@@ -25,6 +25,7 @@ class Reader final : public flight_support::ConfigurationReader {
     Configuration& c = *configuration_;
     Camera& camera = c.inspection.camera;
     double leap_seconds = c.earth_time.leap_seconds;
+    double second = c.second_observer ? 1.0 : 0.0;
     double width = c.imaging.width, height = c.imaging.height;
     double view_width = c.view_width, view_height = c.view_height;
     const NumberKey keys[] = {
@@ -32,6 +33,7 @@ class Reader final : public flight_support::ConfigurationReader {
         {"telemetry_period_s", &c.telemetry_period_s, 1.0, 86400.0},
         {"decision_period_s", &c.decision_period_s, 1.0, 600.0},
         {"burn_lead_s", &c.burn_lead_s, 25.0, 600.0},
+        {"second_observer", &second, 0.0, 1.0},
         {"leap_seconds", &leap_seconds, 0.0, 60.0},
         {"ut1_minus_utc_s", &c.earth_time.ut1_minus_utc_s, -1.0, 1.0},
         {"lag_s", &c.navigation.lag_s, 0.0, 600.0},
@@ -66,13 +68,14 @@ class Reader final : public flight_support::ConfigurationReader {
       if (!set_number(keys[k], 1u << k, value)) return false;
       camera.fy = camera.fx;
       c.earth_time.leap_seconds = static_cast<int>(leap_seconds);
+      c.second_observer = second == 1.0;
       c.imaging.width = static_cast<int>(width);
       c.imaging.height = static_cast<int>(height);
       c.view_width = static_cast<int>(view_width);
       c.view_height = static_cast<int>(view_height);
       if (c.earth_time.leap_seconds != leap_seconds || c.imaging.width != width ||
           c.imaging.height != height || c.view_width != view_width ||
-          c.view_height != view_height) {
+          c.view_height != view_height || (second != 0.0 && second != 1.0)) {
         return fail(key, "is no integer");
       }
       return true;
@@ -83,11 +86,17 @@ class Reader final : public flight_support::ConfigurationReader {
   bool set_role(const char* value) {
     if (role_seen_) return fail("role", "is given twice");
     role_seen_ = true;
-    const bool chaser = std::strcmp(value, "chaser") == 0;
-    if (!chaser && std::strcmp(value, "target") != 0)
-      return fail("role", "is not target or chaser");
-    configuration_->role = chaser ? Role::kChaser : Role::kTarget;
-    return true;
+    const struct {
+      const char* name;
+      Role role;
+    } roles[] = {
+        {"target", Role::kTarget}, {"chaser", Role::kChaser}, {"observer", Role::kObserver}};
+    for (const auto& one : roles) {
+      if (std::strcmp(value, one.name) != 0) continue;
+      configuration_->role = one.role;
+      return true;
+    }
+    return fail("role", "is not target, chaser or observer");
   }
 
   bool set_star_catalogue(const char* value) {

@@ -13,7 +13,7 @@
 
 namespace rpo_kit {
 
-enum class Role { kTarget, kChaser };
+enum class Role { kTarget, kChaser, kObserver };
 
 struct Configuration {
   Role role = Role::kTarget;  ///< the one that cannot do harm
@@ -21,6 +21,7 @@ struct Configuration {
   double telemetry_period_s = 60.0;
   double decision_period_s = 30.0;
   double burn_lead_s = 90.0;
+  bool second_observer = false;  ///< the chaser takes its directions
   flight_support::EarthTime earth_time = {};
   NavigationOptions navigation = {};
   ApproachOptions approach = {};

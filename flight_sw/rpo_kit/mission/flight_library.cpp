@@ -26,10 +26,11 @@ enum PortId : std::uint32_t {
   kTarget = 10,
   kImage = 11,
   kImaging = 12,
-  kView = 13
+  kView = 13,
+  kObservation = 14
 };
 
-constexpr int kPorts = 14;
+constexpr int kPorts = 16;
 constexpr std::uint32_t kMostImageBytes = 1u << 20;
 
 const unsigned char* data_of(Bytes bytes) {
@@ -75,6 +76,9 @@ class HostOutputs final : public Outputs {
   void out_target(const unsigned char* message, std::uint32_t bytes) override {
     host_.output(kTarget, {message, bytes});
   }
+  void out_observation(const unsigned char* packet, std::uint32_t bytes) override {
+    host_.output(kObservation, {packet, bytes});
+  }
   void out_imaging(const unsigned char* message, std::uint32_t bytes) override {
     host_.output(kImaging, {message, bytes});
   }
@@ -107,6 +111,9 @@ class Library {
   std::int32_t bearing(std::int64_t, Bytes bytes) {
     return status(kit_.in_bearing(data_of(bytes), bytes.size));
   }
+  std::int32_t observation(std::int64_t now_ns, Bytes bytes) {
+    return status(kit_.in_observation(now_ns, data_of(bytes), bytes.size));
+  }
   std::int32_t keypoints(std::int64_t, Bytes bytes) {
     return status(kit_.in_keypoints(data_of(bytes), bytes.size));
   }
@@ -133,6 +140,7 @@ const Port (&Library::ports())[kPorts] {
       {kCrosslink, ORRERY_IN, ORRERY_PACKET, "crosslink", 256, &Library::crosslink},
       {kCommand, ORRERY_IN, ORRERY_PACKET, "command", 256, &Library::command},
       {kBearing, ORRERY_IN, ORRERY_PACKET, "bearing", RPO_KIT_BEARING_BYTES, &Library::bearing},
+      {kObservation, ORRERY_IN, ORRERY_PACKET, "observation", 256, &Library::observation},
       {kKeypoints, ORRERY_IN, ORRERY_PACKET, "keypoints", RPO_KIT_KEYPOINTS_BYTES,
        &Library::keypoints},
       {kImage, ORRERY_IN, ORRERY_PACKET, "camera", kMostImageBytes, &Library::image},
@@ -145,6 +153,7 @@ const Port (&Library::ports())[kPorts] {
       {kTelemetry, ORRERY_OUT, ORRERY_PACKET, "telemetry", RPO_KIT_TELEMETRY_BYTES, nullptr},
       {kTarget, ORRERY_OUT, ORRERY_PACKET, "target", RPO_KIT_TARGET_BYTES, nullptr},
       {kImaging, ORRERY_OUT, ORRERY_PACKET, "imaging", RPO_KIT_IMAGING_BYTES, nullptr},
+      {kObservation, ORRERY_OUT, ORRERY_PACKET, "observation", RPO_KIT_OBSERVATION_BYTES, nullptr},
   };
   return table;
 }

@@ -10,6 +10,7 @@
 #include "rpo_kit/imaging/star_file.hpp"
 #include "rpo_kit/rpo_kit_messages.h"
 #include "support/orbit/constants.hpp"
+#include "support/symmetric.hpp"
 
 namespace rpo_kit {
 
@@ -60,6 +61,10 @@ constexpr double kMostTurn_rad = 0.2;
 
 // A track within that of where the target should be is the target's.
 constexpr double kLeastReach_rad = 1e-3, kReachSigmas = 4.0;
+
+// What a second observer says has to be within: of its own directions, of where it may be while its
+// message is on its way, of clocks that differ.
+constexpr double kMostSecond_rad = 0.1, kMostSecond_m = 1e6, kAhead_s = 1.0;
 
 // @return false: numbers that no camera has.
 bool frame_header(const orrery_image& image, FrameHeader* header) {
@@ -166,6 +171,7 @@ EciFix RpoKit::in_eci(const GnssFix& fix) const {
 // Periods are counted in GPS time, not from boot: so both spacecraft send the same epochs.
 void RpoKit::take_fix(std::int64_t, const GnssFix& fix) {
   const std::int64_t slot = fix.epoch_ns / nanoseconds(configuration_.crosslink_period_s);
+  if (configuration_.role == Role::kObserver) return;
   if (!is_chaser()) {
     if (slot == last_crosslink_slot_) return;
     last_crosslink_slot_ = slot;
@@ -193,10 +199,61 @@ bool RpoKit::in_command(std::int64_t now_ns, const unsigned char* message, std::
 
 bool RpoKit::in_bearing(const Bearing& bearing) {
   const double length = norm(bearing.direction_ECI);
-  if (!is_chaser() || !(std::fabs(length - 1.0) < 1e-6) || !(bearing.sigma_rad > 0.0)) {
+  if (configuration_.role == Role::kTarget || !(std::fabs(length - 1.0) < 1e-6) ||
+      !(bearing.sigma_rad > 0.0)) {
     return reject();
   }
+  if (!is_chaser()) return send_observation(bearing) || reject();
   navigation_.bearing(bearing);
+  return true;
+}
+
+// The last fix is of the exposure's time or some seconds off: moved there. Without one that is near
+// enough there is nothing to tell.
+bool RpoKit::send_observation(const Bearing& bearing) {
+  const double apart_s = seconds(bearing.t_ns - last_fix_.epoch_ns);
+  if (std::fabs(apart_s) > configuration_.navigation.pairing_s) return false;
+  const EciFix fix = in_eci(last_fix_);
+  Vec3 r_ECI = fix.state.r_ECI;
+  if (apart_s != 0.0) {
+    r_ECI = position_ECI(propagate(observer_from_state(fix.t_ns, fix.state), bearing.t_ns).mean);
+  }
+  const double variance = std::pow(std::hypot(fix.sigma_r_m, fix.sigma_v_mps * apart_s), 2.0);
+  rpo_kit_observation o{bearing.t_ns, {}, {variance, 0, 0, variance, 0, variance}, {}, 0.0};
+  for (int k = 0; k < 3; ++k) {
+    o.r_ECI[k] = r_ECI[k];
+    o.direction_ECI[k] = bearing.direction_ECI[k];
+  }
+  o.sigma_rad = bearing.sigma_rad;
+  unsigned char packet[RPO_KIT_OBSERVATION_BYTES];
+  rpo_kit_put_observation(packet, &o);
+  out_.out_observation(packet, sizeof packet);
+  return true;
+}
+
+bool RpoKit::in_observation(std::int64_t now_ns, const unsigned char* packet, std::uint32_t bytes) {
+  rpo_kit_observation o;
+  if (!is_chaser() || !configuration_.second_observer ||
+      rpo_kit_get_observation(packet, bytes, &o) == 0) {
+    return reject();
+  }
+  const double* d = o.direction_ECI;
+  const double* r = o.r_ECI;
+  const double* p = o.covariance_ECI;
+  const SecondBearing bearing{o.exposure_ns, vec3(d[0], d[1], d[2]), o.sigma_rad,
+                              vec3(r[0], r[1], r[2]),
+                              Mat3{{{p[0], p[1], p[2]}, {p[1], p[3], p[4]}, {p[2], p[4], p[5]}}}};
+  Mat3 factor;
+  const bool sound = std::fabs(norm(bearing.direction_ECI) - 1.0) < 1e-6 && o.sigma_rad > 0.0 &&
+                     o.sigma_rad < kMostSecond_rad && is_finite(bearing.covariance_ECI) &&
+                     cholesky(bearing.covariance_ECI, &factor) &&
+                     o.exposure_ns <= now_ns + nanoseconds(kAhead_s);
+  if (!sound) return reject();
+  Observer own;
+  // Before the first fix of its own orbit it knows no base line.
+  if (!navigation_.own_at(now_ns, &own)) return true;
+  if (!(norm(bearing.r_ECI - position_ECI(own.mean)) < kMostSecond_m)) return reject();
+  navigation_.second_bearing(bearing);
   return true;
 }
 
@@ -533,7 +590,8 @@ void RpoKit::send_telemetry(std::int64_t now_ns, const RelativeOrbit* now,
   }
   t.delta_v_mps = delta_v_mps_;
   t.burns = burns_;
-  for (int k = 0; k < kSources; ++k) {
+  t.used_second = static_cast<std::uint32_t>(navigation_.used(Source::kSecond));
+  for (int k = 0; k < 3; ++k) {
     t.used[k] = static_cast<std::uint32_t>(navigation_.used(static_cast<Source>(k)));
   }
   t.outliers = static_cast<std::uint32_t>(navigation_.outliers());

@@ -4,6 +4,7 @@
 ///
 /// Target      navigates and tells its GNSS solution; never manoeuvres.
 /// Chaser      finds the target by what sees it, and approaches on command.
+/// Observer    tells where it sees the target, and from where; never manoeuvres.
 /// Times       GPS; the onboard clock is taken to show it, as a GNSS receiver steers it.
 /// Memory      this object, the lists of measurements and what planning takes while it runs.
 #pragma once
@@ -37,6 +38,9 @@ class Outputs {
   virtual void out_mode(std::int64_t t_ns, std::uint32_t mode) = 0;
   virtual void out_estimate(const RelativeOutput& estimate) = 0;
   virtual void out_target(const unsigned char* message, std::uint32_t bytes) = 0;
+  virtual void out_observation(const unsigned char* packet, std::uint32_t bytes) {
+    (void)packet, (void)bytes;
+  }
   virtual void out_imaging(const unsigned char* message, std::uint32_t bytes) = 0;
   virtual void out_telemetry(const unsigned char* packet, std::uint32_t bytes) = 0;
   /// Replaces the one before.
@@ -64,6 +68,10 @@ class RpoKit {
   /// From image processing: a direction to the target, a place of it.
   bool in_bearing(const Bearing& bearing);
   bool in_bearing(const unsigned char* message, std::uint32_t bytes);
+  /// Of a second observer, over a crosslink. Not usable: damaged, from the future, no place near
+  /// the own one, or none is configured. Too late, doubled or outside the gate it is left out
+  /// later.
+  bool in_observation(std::int64_t now_ns, const unsigned char* packet, std::uint32_t bytes);
   bool in_pose(const PlaceMeasurement& place);
   bool in_keypoints(const unsigned char* message, std::uint32_t bytes);
   /// A frame of the camera, or bands of its rows one after the other. Not usable: damaged, of
@@ -97,6 +105,7 @@ class RpoKit {
   void take_sighting(const Sighting& sighting, const Observer& own);
   void look_at_frame(const FrameHeader& header);
   bool expected_target(std::int64_t t_ns, const Observer& own, ExpectedTarget* expected) const;
+  bool send_observation(const Bearing& bearing);
   void send_imaging(const FrameReport& report);
   void send_target();
   void send_telemetry(std::int64_t now_ns, const flight_support::RelativeOrbit* now,

@@ -33,6 +33,9 @@ struct Bus : Outputs {
   void out_target(const unsigned char* message, std::uint32_t bytes) override {
     EXPECT_EQ(rpo_kit_get_target(message, bytes, &target), 1);
   }
+  void out_observation(const unsigned char* packet, std::uint32_t bytes) override {
+    observations.emplace_back(packet, packet + bytes);
+  }
   void out_imaging(const unsigned char* message, std::uint32_t bytes) override {
     EXPECT_EQ(rpo_kit_get_imaging(message, bytes, &imaging), 1);
     ++frames;
@@ -48,7 +51,7 @@ struct Bus : Outputs {
     std::int64_t t_ns;
     Vec3 dv_ECI;
   };
-  std::vector<std::vector<unsigned char>> crosslink;
+  std::vector<std::vector<unsigned char>> crosslink, observations;
   std::vector<Wanted> burns;
   std::vector<std::uint32_t> modes;
   RelativeOutput estimate;
@@ -166,6 +169,81 @@ TEST(RpoKitTest, UnusableInputsAreRejectedAndCounted) {
   RpoKit target(quiet, configured("role = target\n"), {kEpoch_ns, 0});
   EXPECT_FALSE(give(&target, kEpoch_ns, RPO_KIT_GO));
   EXPECT_EQ(quiet.tick_ns, -1);
+}
+
+// What the observer saw, and its own place at that time, four seconds and 30 km after its last fix:
+// within four sigma of the fix, the velocity's noise over 4 s in it.
+TEST(RpoKitTest, ObserverTellsWhereItSawTheTargetAndFromWhere) {
+  Bus bus;
+  RpoKit observer(bus, configured("role = observer\n"), {kEpoch_ns, 0});
+  const std::int64_t exposure_ns = kEpoch_ns + 4 * kSecond_ns;
+  EXPECT_FALSE(observer.in_bearing({exposure_ns, vec3(0.6, 0, 0.8), 1e-4}));  // no fix
+  const StateEci state = flight_test::state_of_mean(flight_test::reference_chief());
+  Noise noise(8);
+  const auto log = flight_test::bestxyz_frame(flight_test::noisy_fix(kEpoch_ns, state, &noise));
+  EXPECT_TRUE(observer.in_gnss(kEpoch_ns, log.data(), static_cast<std::uint32_t>(log.size())));
+  EXPECT_TRUE(observer.in_bearing({exposure_ns, vec3(0.6, 0, 0.8), 1e-4}));
+  EXPECT_FALSE(observer.in_bearing({kEpoch_ns + 7 * kSecond_ns, vec3(0.6, 0, 0.8), 1e-4}));
+  EXPECT_FALSE(give(&observer, kEpoch_ns, RPO_KIT_GO));
+  EXPECT_TRUE(bus.crosslink.empty());
+  EXPECT_EQ(bus.tick_ns, -1);
+  ASSERT_EQ(bus.observations.size(), 1u);
+  rpo_kit_observation o;
+  ASSERT_EQ(rpo_kit_get_observation(bus.observations[0].data(), RPO_KIT_OBSERVATION_BYTES, &o), 1);
+  EXPECT_EQ(o.exposure_ns, exposure_ns);
+  EXPECT_EQ(o.direction_ECI[0], 0.6);
+  EXPECT_EQ(o.direction_ECI[2], 0.8);
+  EXPECT_EQ(o.sigma_rad, 1e-4);
+  const Vec3 then = flight_test::propagate_oblate(state, 4.0).r_ECI;
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(o.r_ECI[k], then[k], 6.1) << k;
+  for (int k : {0, 3, 5}) EXPECT_NEAR(o.covariance_ECI[k], 1.5 * 1.5 + 0.12 * 0.12, 1e-6) << k;
+  for (int k : {1, 2, 4}) EXPECT_EQ(o.covariance_ECI[k], 0.0) << k;
+}
+
+TEST(RpoKitTest, ObservationsAreTakenIfConfiguredAndSound) {
+  const StateEci state = flight_test::state_of_mean(flight_test::reference_chief());
+  const Vec3& r = state.r_ECI;
+  const rpo_kit_observation good{
+      kEpoch_ns, {r[0] + 3e3, r[1], r[2]}, {2, 0, 0, 2, 0, 2}, {0.6, 0, 0.8}, 1e-4};
+  unsigned char packet[RPO_KIT_OBSERVATION_BYTES];
+  const auto given = [&](RpoKit* kit, const rpo_kit_observation& o) {
+    rpo_kit_put_observation(packet, &o);
+    return kit->in_observation(kEpoch_ns + 3 * kSecond_ns, packet, sizeof packet);
+  };
+  for (const char* text : {"role = chaser\n", "role = target\n", "role = observer\n"}) {
+    Bus bus;
+    RpoKit kit(bus, configured(text), {kEpoch_ns, 0});
+    EXPECT_FALSE(given(&kit, good)) << text;
+  }
+  Bus bus;
+  RpoKit chaser(bus, configured("role = chaser\nsecond_observer = 1\n"), {kEpoch_ns, 0});
+  EXPECT_TRUE(given(&chaser, good));  // and left out: it does not know where it is itself
+  Noise noise(8);
+  const auto log = flight_test::bestxyz_frame(flight_test::noisy_fix(
+      kEpoch_ns - 60 * kSecond_ns, flight_test::propagate_oblate(state, -60.0), &noise));
+  EXPECT_TRUE(chaser.in_gnss(kEpoch_ns, log.data(), static_cast<std::uint32_t>(log.size())));
+  chaser.in_tick(kEpoch_ns);
+  EXPECT_TRUE(given(&chaser, good));
+  std::vector<rpo_kit_observation> bad(9, good);
+  bad[0].exposure_ns += 10 * kSecond_ns;
+  bad[1].r_ECI[1] += 2e6;
+  bad[2].r_ECI[2] = NAN;
+  bad[3].covariance_ECI[3] = -1;
+  bad[4].covariance_ECI[1] = 3;
+  bad[5].covariance_ECI[5] = INFINITY;
+  bad[6].direction_ECI[1] = 0.1;
+  bad[7].sigma_rad = 0;
+  bad[8].sigma_rad = NAN;
+  for (std::size_t k = 0; k < bad.size(); ++k) EXPECT_FALSE(given(&chaser, bad[k])) << k;
+  rpo_kit_put_observation(packet, &good);
+  EXPECT_FALSE(chaser.in_observation(kEpoch_ns, packet, sizeof packet - 1));
+  for (std::size_t k = 0; k < sizeof packet; ++k) {
+    packet[k] ^= 0x10;
+    EXPECT_FALSE(chaser.in_observation(kEpoch_ns, packet, sizeof packet)) << k;
+    packet[k] ^= 0x10;
+  }
+  EXPECT_TRUE(chaser.in_observation(kEpoch_ns, packet, sizeof packet));
+  EXPECT_EQ(chaser.navigation().dropped(), 1);  // of that time there is one
 }
 
 // What a camera of 64 x 64 px sends: a band of one frame, all of its pixels alike.
@@ -308,7 +386,11 @@ TEST(RpoKitConfigurationTest, WrongTextIsNamed) {
   EXPECT_NE(complaint("star_catalogue = /stars\n").find("needs image_width_px"), std::string::npos);
   EXPECT_NE(complaint("star_catalogue =\n").find("is no path"), std::string::npos);
   EXPECT_NE(complaint("image_width_px = 64.5\n").find("is no integer"), std::string::npos);
-  EXPECT_EQ(complaint("role = chief\n"), "configuration line 1: 'role' is not target or chaser");
+  EXPECT_EQ(complaint("role = chief\n"),
+            "configuration line 1: 'role' is not target, chaser or observer");
+  EXPECT_NE(complaint("second_observer = 0.5\n").find("is no integer"), std::string::npos);
+  EXPECT_NE(complaint("range_known = 2\n").find("[0.001, 1]"), std::string::npos);
+  EXPECT_FALSE(configured("role = chaser\n").second_observer);
   EXPECT_NE(complaint("lost_s = 5\n").find("[60, 1e+06]"), std::string::npos);
   EXPECT_NE(complaint("waypoint = -100 20 3\n").find("lacks a number"), std::string::npos);
   EXPECT_NE(complaint("waypoint = -100 0 3 0\n").find("radius_m > 0"), std::string::npos);
