@@ -44,7 +44,7 @@ class Reader final : public flight_support::ConfigurationReader {
     static_assert(sizeof keys / sizeof keys[0] <= 32, "seen_ has a bit per key");
     for (std::size_t k = 0; k < sizeof keys / sizeof keys[0]; ++k) {
       if (std::strcmp(key, keys[k].name) != 0) continue;
-      if (!set_number(keys[k], 1u << k, value)) return false;
+      if (!set_number(keys, k, value)) return false;
       if (keys[k].value == &leap_seconds) {
         navigation.earth_time.leap_seconds = static_cast<int>(leap_seconds);
         if (navigation.earth_time.leap_seconds != leap_seconds) return fail(key, "is no integer");

@@ -53,8 +53,12 @@ class ConfigurationReader {
 
   virtual bool set(const char* key, const char* value) = 0;
 
-  /// @param bit  of the key, one of 32.
-  bool set_number(const NumberKey& key, std::uint32_t bit, const char* text) {
+  /// Of the k-th key.
+  template <std::size_t kCount>
+  bool set_number(const NumberKey (&keys)[kCount], std::size_t k, const char* text) {
+    static_assert(kCount <= 64, "a bit each");
+    const NumberKey& key = keys[k];
+    const std::uint64_t bit = std::uint64_t{1} << k;
     if ((seen_ & bit) != 0) return fail(key.name, "is given twice");
     seen_ |= bit;
     char* end = nullptr;
@@ -96,7 +100,7 @@ class ConfigurationReader {
   char* message_;
   std::size_t message_bytes_;
   int line_ = 0;
-  std::uint32_t seen_ = 0;
+  std::uint64_t seen_ = 0;  // a bit for each number's key
 };
 
 }  // namespace flight_support

@@ -65,7 +65,7 @@ class Reader final : public flight_support::ConfigurationReader {
     };
     for (std::size_t k = 0; k < sizeof keys / sizeof keys[0]; ++k) {
       if (std::strcmp(key, keys[k].name) != 0) continue;
-      if (!set_number(keys[k], 1u << k, value)) return false;
+      if (!set_number(keys, k, value)) return false;
       camera.fy = camera.fx;
       c.earth_time.leap_seconds = static_cast<int>(leap_seconds);
       c.second_observer = second == 1.0;
