@@ -145,11 +145,13 @@ function(orrery_cross_target_program processor)
   set(heap ${c}/orrery/harness/heap)
   set(plugin ${c}/instruction_count.c)
   set(serve ${c}/orrery_flight_target.c ${c}/orrery_wire.c)
+  set(headers "")
   if(NOT EXISTS ${c})
     cmake_path(SET root NORMALIZE ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/../..)
     set(heap ${root}/harness/heap)
     set(plugin ${root}/harness/remote/instruction_count.c)
     set(serve ${root}/flight_sw/host/orrery_flight_target.c ${root}/flight_sw/abi/orrery_wire.c)
+    file(GLOB headers ${root}/flight_sw/host/*.h ${root}/flight_sw/abi/*.h ${heap}/*.hpp)
   endif()
   set(sources "")
   foreach(part IN ITEMS target_heap block_heap first_fit_heap recency_list)
@@ -161,11 +163,12 @@ function(orrery_cross_target_program processor)
   set(kernel "$<TARGET_PROPERTY:orrery::kernel,INTERFACE_INCLUDE_DIRECTORIES>")
   add_custom_command(OUTPUT ${output}
     COMMAND ${CMAKE_COMMAND} -E make_directory ${place}
-    COMMAND ${ORRERY_CROSS_CC_${processor}} -std=c99 -O2 -g "-I$<JOIN:${abi},;-I>" -r ${serve} -o ${output}.o
+    # Loops over the bytes of a number become straight: to an emulator each turn is a block.
+    COMMAND ${ORRERY_CROSS_CC_${processor}} -std=c99 -O3 -g "-I$<JOIN:${abi},;-I>" -r ${serve} -o ${output}.o
     # The C library's malloc is replaced: the compiler must not know what malloc does.
     COMMAND ${ORRERY_CROSS_CXX_${processor}} -std=c++20 -O2 -g -fno-builtin -Wno-narrowing
       "-I$<JOIN:${abi},;-I>" "-I$<JOIN:${kernel},;-I>" -I${c} ${sources} ${output}.o -o ${output} -ldl
-    DEPENDS ${serve} ${sources} COMMAND_EXPAND_LISTS VERBATIM
+    DEPENDS ${serve} ${sources} ${headers} COMMAND_EXPAND_LISTS VERBATIM
     COMMENT "Building orrery-flight-target for ${processor}")
   add_custom_target(orrery-flight-target.${processor} DEPENDS ${output})
   if(NOT TARGET orrery-instruction-count)

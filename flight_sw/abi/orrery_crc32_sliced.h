@@ -30,7 +30,8 @@ ORRERY_MAYBE_UNUSED static uint32_t orrery_crc32_sliced_update(const orrery_crc3
                                                                const unsigned char* data,
                                                                size_t bytes) {
   for (; bytes >= 4; bytes -= 4, data += 4) {
-    crc ^= orrery_get_u32(data);
+    crc ^= (uint32_t)data[0] | (uint32_t)data[1] << 8 | (uint32_t)data[2] << 16 |
+           (uint32_t)data[3] << 24; /* one load where the processor has it, and no loop */
     crc = tables->of[3][crc & 0xFFu] ^ tables->of[2][(crc >> 8) & 0xFFu] ^
           tables->of[1][(crc >> 16) & 0xFFu] ^ tables->of[0][crc >> 24];
   }

@@ -10,7 +10,6 @@
 #include <netinet/tcp.h>
 #include <signal.h>
 #include <string.h>
-#include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <sys/wait.h>
@@ -19,6 +18,7 @@
 #include <unistd.h>
 
 #include "orrery_flight_library.h"
+#include "orrery_mailbox.h"
 #include "orrery_wire.h"
 
 static const char kUsage[] =
@@ -30,6 +30,7 @@ static const char kUsage[] =
     "     --serial DEVICE:BAUD     a serial line, raw, 8N1\n"
     "--once                        ends after the first client\n"
     "--heap BYTES                  a simulated heap for flight code, where it is linked\n"
+    "--no-clock                    no call is timed: an emulator's pace says nothing\n"
     "--instructions PAGE           cost as counted by harness/remote/instruction_count.c\n";
 
 /* harness/heap/target_heap.cpp, where it is linked. */
@@ -40,27 +41,33 @@ __attribute__((weak)) void orrery_target_heap_leave(orrery_wire_cost* cost);
 /* Of the counting plugin: instructions between the last two marks. Null: host time is the cost. */
 static const volatile uint64_t* instructions;
 static uint64_t instructions_of_marks;
+static int is_timed = 1;
 
 typedef struct connection {
   FILE* in; /* buffered: a request takes one read() */
   int out;
   uint64_t begin_ns;
+  orrery_mailbox_target box;
 } connection;
 
 static int32_t read_all(void* context, void* buffer, uint32_t bytes) {
-  FILE* in = ((connection*)context)->in;
+  connection* c = context;
+  const int boxed = orrery_mailbox_read(&c->box, buffer, bytes);
   uint32_t at = 0;
-  while ((at += (uint32_t)fread((char*)buffer + at, 1, bytes - at, in)) < bytes) {
-    if (feof(in) || errno != EINTR) return -1;
-    clearerr(in);
+  if (boxed != 0) return boxed > 0 ? 0 : -1;
+  while ((at += (uint32_t)fread((char*)buffer + at, 1, bytes - at, c->in)) < bytes) {
+    if (feof(c->in) || errno != EINTR) return -1;
+    clearerr(c->in);
   }
+  orrery_mailbox_has_read(&c->box);
   return 0;
 }
 
 static int32_t write_all(void* context, const void* data, uint32_t bytes) {
-  uint32_t at = 0;
+  connection* c = context;
+  uint32_t at = orrery_mailbox_write(&c->box, data, bytes) ? bytes : 0;
   while (at < bytes) {
-    const ssize_t n = write(((connection*)context)->out, (const char*)data + at, bytes - at);
+    const ssize_t n = write(c->out, (const char*)data + at, bytes - at);
     if (n == 0 || (n < 0 && errno != EINTR)) return -1;
     if (n > 0) at += (uint32_t)n;
   }
@@ -91,23 +98,27 @@ static uint64_t host_now_ns(void) {
 
 static void call_begins(void* context) {
   if (orrery_target_heap_enter != NULL) orrery_target_heap_enter();
-  ((connection*)context)->begin_ns = host_now_ns();
+  if (is_timed) ((connection*)context)->begin_ns = host_now_ns();
   if (instructions != NULL) mark(1);
 }
 
 /* Host time is for reports alone; instructions repeat, so simulated time may depend on them. */
 static void call_ended(void* context, orrery_wire_cost* cost) {
   if (instructions != NULL) mark(2);
-  cost->unit = instructions != NULL ? ORRERY_WU_INSTRUCTIONS : ORRERY_WU_NS;
-  cost->cost = instructions != NULL ? *instructions - instructions_of_marks
-                                    : host_now_ns() - ((connection*)context)->begin_ns;
+  if (instructions != NULL) {
+    cost->unit = ORRERY_WU_INSTRUCTIONS;
+    cost->cost = *instructions - instructions_of_marks;
+  } else if (is_timed) {
+    cost->unit = ORRERY_WU_NS;
+    cost->cost = host_now_ns() - ((connection*)context)->begin_ns;
+  }
   if (orrery_target_heap_leave != NULL) orrery_target_heap_leave(cost);
 }
 
 /* The library is not closed: a client that goes away leaves one that no destroy has ended. */
 static int serve(const char* path, int in, int out) {
   static uint64_t work[1 << 20];
-  connection c = {.in = fdopen(in, "r"), .out = out};
+  connection c = {.in = fdopen(in, "r"), .out = out, .box.box = orrery_mailbox_attach(in, out)};
   const orrery_wire_link link = {&c, read_all, write_all, call_begins, call_ended};
   void* library;
   const orrery_flight* flight = open_flight_library(path, &library);
@@ -124,19 +135,6 @@ static int serve_stdio(const char* path) {
   return serve(path, in, out);
 }
 
-static speed_t speed_of(const char* baud) {
-  static const struct {
-    const char* name;
-    speed_t speed;
-  } kSpeeds[] = {{"9600", B9600},     {"19200", B19200},   {"38400", B38400},
-                 {"57600", B57600},   {"115200", B115200}, {"230400", B230400},
-                 {"460800", B460800}, {"921600", B921600}, {"1000000", B1000000}};
-  size_t i = 0, count = sizeof kSpeeds / sizeof kSpeeds[0];
-  while (i < count && strcmp(kSpeeds[i].name, baud) != 0) ++i;
-  if (i == count) fail("not a rate from 9600 to 921600 baud, or 1000000", baud);
-  return kSpeeds[i].speed;
-}
-
 /* Its library starts as it was linked, and a crash ends that process alone. */
 static int serve_in_child(const char* path, int fd, int listener) {
   int status = 0;
@@ -148,7 +146,7 @@ static int serve_in_child(const char* path, int fd, int listener) {
   }
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) continue;
   if (WIFSIGNALED(status)) {
-    fprintf(stderr, "orrery-flight-target: flight code ended by signal %d (%s)\n", WTERMSIG(status),
+    fprintf(stderr, PROGRAM ": flight code ended by signal %d (%s)\n", WTERMSIG(status),
             strsignal(WTERMSIG(status)));
   }
   return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
@@ -166,9 +164,9 @@ static int serve_serial(const char* path, char* device, int once) {
   if (fd < 0 || tcgetattr(fd, &line) != 0) fail(device, strerror(errno));
   cfmakeraw(&line);
   line.c_cflag |= CLOCAL | CREAD;
-  if (cfsetspeed(&line, speed_of(baud)) != 0 || tcsetattr(fd, TCSANOW, &line) != 0) {
-    fail(device, strerror(errno));
-  }
+  /* glibc takes the number, not its code alone */
+  if (cfsetspeed(&line, (speed_t)strtoul(baud, NULL, 10)) != 0) fail("not a baud rate", baud);
+  if (tcsetattr(fd, TCSANOW, &line) != 0) fail(device, strerror(errno));
   do {
     for (heard = 0; heard != 5;) {
       const ssize_t n = read(fd, &heard, 1);
@@ -240,6 +238,8 @@ int main(int argc, char** argv) {
     const char* option = argv[i];
     if (strcmp(option, "--once") == 0) {
       once = 1;
+    } else if (strcmp(option, "--no-clock") == 0) {
+      is_timed = 0;
     } else if (strcmp(option, "--stdio") == 0) {
       how = option;
     } else if (option[0] != '-') {

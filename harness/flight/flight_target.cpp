@@ -45,7 +45,9 @@ TargetAddress where_it_runs(const FlightProcessOptions& options) {
   if (options.target.port != 0) {
     environment += "env QEMU_GDB=" + std::to_string(options.target.port) + " ";
   }
-  started.where += " --heap " + std::to_string(std::min(options.heap_bytes, kMostHeap_bytes));
+  // Its time says nothing of the processor that it emulates, and to ask for it is emulated, too.
+  started.where +=
+      " --no-clock --heap " + std::to_string(std::min(options.heap_bytes, kMostHeap_bytes));
   if (times_by_work(options)) {
     const std::string page = "199";  // a descriptor that nobody else takes
     environment += "env QEMU_PLUGIN='" + built_for(options, "orrery-instruction-count") +

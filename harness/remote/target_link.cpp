@@ -14,9 +14,12 @@
 #include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
+#include <orrery_mailbox.h>
 #include <poll.h>
 #include <spawn.h>
+#include <sys/mman.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/time.h>
 #include <sys/un.h>
 #include <sys/wait.h>
@@ -54,17 +57,23 @@ Pipe make_pipe(const TargetAddress& address) {
   return {.read_end = ends[0], .write_end = ends[1]};
 }
 
+constexpr int kMailboxThere = 198;  // a descriptor that nobody else takes
+
 // The command, with the pipes as its standard input and output: they cost half of what a socket
-// does.
-pid_t start(const TargetAddress& address, const Pipe& requests, const Pipe& answers) {
+// does. The mailbox's descriptor or -1.
+pid_t start(const TargetAddress& address, const Pipe& requests, const Pipe& answers, int mailbox) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, requests.read_end, STDIN_FILENO);
   posix_spawn_file_actions_adddup2(&actions, answers.write_end, STDOUT_FILENO);
+  if (mailbox >= 0) posix_spawn_file_actions_adddup2(&actions, mailbox, kMailboxThere);
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
   std::string shell = "sh", option = "-c", command = "exec " + address.where;
+  if (mailbox >= 0) {
+    command = "export ORRERY_MAILBOX=" + std::to_string(kMailboxThere) + "; " + command;
+  }
   std::array<char*, 4> arguments{shell.data(), option.data(), command.data(), nullptr};
   pid_t child = -1;
   const int error =
@@ -238,6 +247,85 @@ class TargetLink::Watch {
   std::thread thread_;
 };
 
+// The simulation's side of orrery_mailbox.h.
+class TargetLink::Mailbox {
+ public:
+  /// Null where there is no memory to share.
+  static std::unique_ptr<Mailbox> between(const Pipe& requests, const Pipe& answers) {
+    auto made = std::make_unique<Mailbox>();
+    struct stat in {
+    }, out{};
+    made->fd_ = memfd_create("orrery mailbox", MFD_CLOEXEC | MFD_ALLOW_SEALING);
+    // Sealed: were it cut short by the other side, looking at it would end this program.
+    if (made->fd_ < 0 || ftruncate(made->fd_, sizeof(orrery_mailbox)) != 0 ||
+        fcntl(made->fd_, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL) != 0 ||
+        fstat(requests.read_end, &in) != 0 || fstat(answers.write_end, &out) != 0) {
+      return nullptr;
+    }
+    void* mapped =
+        mmap(nullptr, sizeof(orrery_mailbox), PROT_READ | PROT_WRITE, MAP_SHARED, made->fd_, 0);
+    if (mapped == MAP_FAILED) return nullptr;
+    made->box_ = static_cast<orrery_mailbox*>(mapped);
+    made->box_->magic = ORRERY_MAILBOX_MAGIC;
+    made->box_->request_pipe = in.st_ino;
+    made->box_->answer_pipe = out.st_ino;
+    made->box_->answers.state = ORRERY_MAILBOX_ASLEEP;  // HELLO takes the pipe
+    return made;
+  }
+  Mailbox() = default;
+  ~Mailbox() {
+    passed_on();
+    if (box_ != nullptr) munmap(box_, sizeof *box_);
+  }
+  Mailbox(const Mailbox&) = delete;
+  Mailbox& operator=(const Mailbox&) = delete;
+
+  int descriptor() const { return fd_; }
+  void passed_on() {
+    if (fd_ >= 0) close(fd_);
+    fd_ = -1;
+  }
+  /// What the two have their core for.
+  void begin_exchange(bool to_themselves) {
+    constexpr std::uint32_t kYields = 8;  // more show that the other side takes longer than a turn
+    yields_ = to_themselves ? kYields : 0;
+    is_attached_ = __atomic_load_n(&box_->attached, __ATOMIC_ACQUIRE) == 1;
+    __atomic_store_n(&box_->yields, yields_, __ATOMIC_RELAXED);
+    writes_ = hears_ = true;
+  }
+  /// False: it has to take the pipe.
+  bool put(Bytes data) {
+    return std::exchange(writes_, false) && is_attached_ &&
+           data.size() <= ORRERY_MAILBOX_SLOT_BYTES &&
+           orrery_mailbox_put(&box_->requests, data.data(),
+                              static_cast<std::uint32_t>(data.size())) != 0;
+  }
+  /// 0: it comes by the pipe.
+  std::size_t take(std::byte* to, std::size_t bytes) {
+    if (!std::exchange(hears_, false) || !is_attached_) return 0;
+    const std::size_t there = orrery_mailbox_wait(&box_->answers, yields_);
+    sleeps_ = there == 0;
+    if (sleeps_) return 0;
+    if (there > ORRERY_MAILBOX_SLOT_BYTES || there > bytes) {
+      throw TargetLost("sent a mailbox that says it holds " + std::to_string(there) + " bytes");
+    }
+    std::memcpy(to, box_->answers.data, there);
+    orrery_mailbox_empty(&box_->answers);
+    return there;
+  }
+  void has_read_pipe() {
+    if (std::exchange(sleeps_, false)) orrery_mailbox_empty(&box_->answers);
+  }
+
+ private:
+  orrery_mailbox* box_ = nullptr;
+  int fd_ = -1;
+  std::uint32_t yields_ = 0;
+  bool is_attached_ = false;
+  bool sleeps_ = true;                   // at the pipe, and says so in the slot; for HELLO already
+  bool writes_ = false, hears_ = false;  // the first bytes of a request, of an answer
+};
+
 TargetLink::TargetLink(const TargetAddress& address, Duration patience) : TargetLink(-1, patience) {
   if (address.kind != Kind::kExec) {
     listen_to(reach(address, patience));
@@ -251,7 +339,10 @@ TargetLink::TargetLink(const TargetAddress& address, Duration patience) : Target
   fcntl(out_, F_SETFL, fcntl(out_, F_GETFL) | O_NONBLOCK);
   core_ = SharedCore::of_this_thread();
   core_->hold();
-  const pid_t child = start(address, requests, answers);
+  mailbox_ = Mailbox::between(requests, answers);
+  const pid_t child =
+      start(address, requests, answers, mailbox_ != nullptr ? mailbox_->descriptor() : -1);
+  if (mailbox_ != nullptr) mailbox_->passed_on();
   if (child < 0) {
     core_->leave(-1);
     cannot_reach(address, system_error(-child));
@@ -297,6 +388,7 @@ void TargetLink::begin_exchange() {
   deadline_ns_ = now_ns + patience_.count();
   may_block_ = true;
   if (core_ != nullptr) core_->take_turn(now_ns);
+  if (mailbox_ != nullptr) mailbox_->begin_exchange(core_->has_to_itself(now_ns));
 }
 
 // The other end is closed: of a child, how.
@@ -342,6 +434,7 @@ void TargetLink::wait_for(short events) {
 }
 
 void TargetLink::write(Bytes data) {
+  if (mailbox_ != nullptr && mailbox_->put(data)) return;
   while (!data.empty()) {
     // Without a signal where the other end is gone, which pipe and serial line never are.
     const ssize_t sent = is_socket_
@@ -359,6 +452,10 @@ void TargetLink::write(Bytes data) {
 
 // What there is, 1 byte at least.
 std::size_t TargetLink::receive(std::byte* to, std::size_t bytes) {
+  if (mailbox_ != nullptr) {
+    const std::size_t there = mailbox_->take(to, bytes);
+    if (there > 0) return there;
+  }
   for (;;) {
     ssize_t got = 0;
     if (watch_ != nullptr) {
@@ -373,7 +470,10 @@ std::size_t TargetLink::receive(std::byte* to, std::size_t bytes) {
     } else {
       got = ::read(in_, to, bytes);
     }
-    if (got > 0) return static_cast<std::size_t>(got);
+    if (got > 0) {
+      if (mailbox_ != nullptr) mailbox_->has_read_pipe();
+      return static_cast<std::size_t>(got);
+    }
     if (got == 0 || (errno != EAGAIN && errno != EINTR)) throw TargetLost(how_it_ended());
     if (errno == EAGAIN) wait_for(POLLIN);
   }

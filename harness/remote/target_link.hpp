@@ -24,6 +24,9 @@ class TargetLost : public std::runtime_error {
 /// socket's
 ///            timeout or, on the pipes to a command, by a thread that sleeps until the exchange
 ///            must have ended.
+/// Memory     A command that knows how (orrery_mailbox.h) is also asked and answers through memory
+///            that both see, while they have their core to themselves: to let the other one run
+///            costs less than a pipe then, and with a third it would cost milliseconds.
 /// One core   The two take turns: a command runs on the core of the thread that calls it
 ///            (SharedCore), unless it sets its affinity itself (taskset).
 /// Host time is read to give up only; no result of a run depends on it.
@@ -47,6 +50,7 @@ class TargetLink {
 
  private:
   class Watch;
+  class Mailbox;
   void listen_to(int socket);
   void wait_for(short events);
   std::size_t receive(std::byte* to, std::size_t bytes);
@@ -61,6 +65,7 @@ class TargetLink {
   bool may_block_ = false;  // the next wait ends at deadline_ns_ by itself
   pid_t child_ = -1;        // -1: none was started
   std::unique_ptr<Watch> watch_;
+  std::unique_ptr<Mailbox> mailbox_;  // of a command
   std::shared_ptr<SharedCore> core_;  // of a command
   ByteBuffer buffer_;
   std::size_t begin_ = 0, end_ = 0;  // unread part of the buffer

@@ -5,6 +5,7 @@
 #include <orrery/harness/flight/flight_process.hpp>
 #include <orrery/harness/flight/flight_target.hpp>
 #include <orrery/harness/flight/processor_model.hpp>
+#include <orrery/harness/remote/shared_core.hpp>
 
 #include <gmock/gmock.h>
 
@@ -100,6 +101,18 @@ TEST(RemoteProcess, ACrashThereEndsThatProcessByName) {
               AllOf(HasSubstr("the link to its processor broke"), HasSubstr("ended by signal 6")));
   EXPECT_EQ(process.crash().port, "do");
   EXPECT_EQ(process.output_count(), 0u);  // what had not left is lost
+}
+
+// Whether they yield to each other or wait at their pipes, by turns.
+TEST(RemoteProcess, ThroughMemoryItAnswersTheSame) {
+  FlightProcess near(here());
+  const std::string expected = flown(near);
+  for (const bool to_themselves : {true, false, true}) {
+    SharedCore::of_this_thread()->assume_to_itself(to_themselves);
+    FlightProcess far(there());
+    EXPECT_EQ(flown(far), expected) << to_themselves;
+  }
+  SharedCore::of_this_thread()->assume_to_itself({});
 }
 
 TEST(RemoteProcess, WhatCannotBeReachedIsRefusedByName) {

@@ -4,11 +4,15 @@
 
 #include <gmock/gmock.h>
 
+#include <chrono>
+#include <csignal>
 #include <fstream>
 #include <orrery_crc32_sliced.h>
+#include <orrery_messages.h>
 #include <random>
 #include <sched.h>
 #include <sys/socket.h>
+#include <sys/wait.h>
 #include <unistd.h>
 #include <vector>
 
@@ -97,6 +101,136 @@ TEST(TargetLink, ASocketThatReadsNothingOrIsClosedIsNamed) {
               HasSubstr("did not answer within 100"));
   close(ends[1]);
   EXPECT_THAT(why_lost([&] { link.write(ByteBuffer(10)); }), HasSubstr("closed the link"));
+}
+
+// ---- memory beside the pipes (mailbox_target.c)
+
+// Says to links of this thread that they have their core to themselves, or have not.
+struct TargetLinkMailboxTest : testing::Test {
+  void TearDown() override { SharedCore::of_this_thread()->assume_to_itself({}); }
+  static void to_themselves(bool is) { SharedCore::of_this_thread()->assume_to_itself(is); }
+
+  /// Sends that many bytes, hears them again. How many requests came through memory so far.
+  static std::uint32_t echo(TargetLink& link, std::uint32_t bytes) {
+    ByteBuffer sent(4 + bytes), heard(4 + bytes);
+    orrery_put_u32(reinterpret_cast<unsigned char*>(sent.data()), bytes);
+    for (std::size_t i = 4; i < sent.size(); ++i) sent[i] = static_cast<std::byte>(i * 7 + i / 251);
+    link.begin_exchange();
+    link.write(sent);
+    link.read(heard.data(), heard.size());
+    EXPECT_TRUE(std::equal(sent.begin() + 4, sent.end(), heard.begin() + 4)) << bytes;
+    return orrery_get_u32(reinterpret_cast<const unsigned char*>(heard.data()));
+  }
+  static char greeting(TargetLink& link) {
+    std::byte heard{};
+    link.read(&heard, 1);
+    return static_cast<char>(heard);
+  }
+};
+
+TEST_F(TargetLinkMailboxTest, WhatFitsGoesThroughMemoryAndTheRestThroughThePipes) {
+  to_themselves(true);
+  TargetLink link(command(MAILBOX_TARGET), 20s);
+  ASSERT_EQ(greeting(link), 'm');
+  std::uint32_t boxed = 0;
+  for (const std::uint32_t bytes : {1, 2, 1000, 16380, 16381, 300'000, 300'001, 5}) {
+    const std::uint32_t now = echo(link, bytes);
+    EXPECT_LE(now, boxed + (bytes <= 16380 ? 1 : 0)) << bytes;
+    boxed = now;
+  }
+  // Where others take the core for long, a side may have gone to sleep before it hears.
+  for (std::uint32_t i = 0; i < 200; ++i) boxed = echo(link, i % 50);
+  EXPECT_GT(boxed, 20u);
+}
+
+// Each side finds the other awake, asleep, or just between.
+TEST_F(TargetLinkMailboxTest, WhoYieldsMayChangeWithEachExchange) {
+  TargetLink link(command(MAILBOX_TARGET), 20s);
+  ASSERT_EQ(greeting(link), 'm');
+  std::mt19937 random(1);
+  for (int i = 0; i < 400; ++i) {
+    to_themselves(random() % 2 == 0);
+    if (random() % 8 == 0) sched_yield();
+    if (random() % 64 == 0) usleep(50);
+    const auto any = static_cast<std::uint32_t>(random());
+    echo(link, any % 16 == 0 ? any % 40'000 : any % 100);
+  }
+}
+
+TEST_F(TargetLinkMailboxTest, OnCoresOfTheirOwnTheySeeTheSameBytes) {
+  to_themselves(true);
+  TargetLink link(command("taskset 0xffff " MAILBOX_TARGET), 20s);
+  ASSERT_EQ(greeting(link), 'm');
+  for (std::uint32_t i = 0; i < 300; ++i) echo(link, i % 300);
+}
+
+TEST_F(TargetLinkMailboxTest, WithPipesOfItsOwnATargetTakesThem) {
+  to_themselves(true);
+  TargetLink link(command("sh -c 'cat | " MAILBOX_TARGET " | cat'"), 20s);
+  EXPECT_EQ(greeting(link), 'p');
+  EXPECT_EQ(echo(link, 100), 0u);
+}
+
+TEST_F(TargetLinkMailboxTest, WhoeverBreaksIsNamed) {
+  for (const bool is : {true, false}) {
+    to_themselves(is);
+    for (const auto& [way, told] :
+         {std::pair("killed", "ended by signal 9"), std::pair("exits", "ended with exit status 3"),
+          std::pair("stopped", "did not answer within 200"),
+          std::pair("silent", "did not answer within 200"),
+          std::pair("lies", "says it holds 16385 bytes"),
+          std::pair("scribbles", "ended with exit status 8")}) {
+      const bool waits = std::string(told).starts_with("did not answer");
+      TargetLink link(command(std::string(MAILBOX_TARGET " ") + way), waits ? 200ms : 20s);
+      ASSERT_EQ(greeting(link), 'm');
+      echo(link, 1);
+      echo(link, 2);
+      EXPECT_THAT(why_lost([&] { echo(link, 3), echo(link, 4); }), HasSubstr(told)) << way << is;
+    }
+  }
+}
+
+// A state that only the reader may set, and memory that is to be cut short.
+TEST_F(TargetLinkMailboxTest, WhatATargetMayNotDoToItsMemoryHarmsNobody) {
+  to_themselves(true);
+  for (const char* way : {"forgets", "cuts"}) {
+    TargetLink link(command(std::string(MAILBOX_TARGET " ") + way), 20s);
+    ASSERT_EQ(greeting(link), 'm');
+    for (std::uint32_t i = 0; i < 20; ++i) echo(link, i);
+  }
+}
+
+// A third one on the same core takes half of it.
+TEST_F(TargetLinkMailboxTest, AThirdOnTheirCoreIsSeen) {
+  cpu_set_t before, one;
+  ASSERT_EQ(sched_getaffinity(0, sizeof before, &before), 0);
+  CPU_ZERO(&one);
+  CPU_SET(sched_getcpu(), &one);
+  ASSERT_EQ(sched_setaffinity(0, sizeof one, &one), 0);
+  int ready[2];
+  ASSERT_EQ(pipe(ready), 0);
+  const pid_t third = fork();
+  if (third == 0) {
+    if (::write(ready[1], "", 1) != 1) _exit(1);
+    for (;;) getppid();
+  }
+  char byte = 0;
+  EXPECT_EQ(::read(ready[0], &byte, 1), 1);
+  SharedCore core;
+  int alone = 0;
+  const auto now_ns = [] {
+    return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
+  };
+  for (int i = 0; i < 12; ++i) {
+    alone += core.has_to_itself(now_ns()) ? 1 : 0;
+    for (const std::int64_t end_ns = now_ns() + 11'000'000; now_ns() < end_ns;) continue;
+  }
+  kill(third, SIGKILL);
+  waitpid(third, nullptr, 0);
+  close(ready[0]);
+  close(ready[1]);
+  sched_setaffinity(0, sizeof before, &before);
+  EXPECT_LT(alone, 4) << "of 12";
 }
 
 // ---- one core
