@@ -2,14 +2,19 @@
  * them: what begins a request or an answer may go through it, which spares the system calls of a
  * pipe. What it carries is the bytes of orrery_wire.h. C99 with the atomics of gcc and clang.
  *
- * Passing  The simulation makes a memfd that cannot shrink, and names its descriptor in
- *          ORRERY_MAILBOX. A target whose standard input and output are the very pipes that it
- * tells of says so in `attached`, before its HELLO. Any other target never looks. Turns    Of a
- * request, and of an answer, the first bytes alone may go here, if the slot is empty and large
- * enough; else all of it takes the pipe, as HELLO does. Waiting  The reader lets others run
- * `yields` times, then marks the slot asleep and reads the pipe; the one who finds it so writes to
- * the pipe. So whoever dies, stops or lies, the other one waits at the pipe, where waits have an
- * end.
+ * Passing
+ *   The simulation makes a memfd that cannot shrink, and names its descriptor in ORRERY_MAILBOX. A
+ *   target whose standard input and output are the very pipes that it tells of says so in
+ *   `attached`, before its HELLO. Any other target never looks.
+ *
+ * Turns
+ *   Of a request, and of an answer, the first bytes alone may go here, if the slot is empty and
+ *   large enough; else all of it takes the pipe, as HELLO does.
+ *
+ * Waiting
+ *   The reader lets others run `yields` times, then marks the slot asleep and reads the pipe; the
+ *   one who finds it so writes to the pipe. So whoever dies, stops or lies, the other one waits at
+ *   the pipe, where waits have an end.
  */
 #ifndef ORRERY_MAILBOX_H
 #define ORRERY_MAILBOX_H
