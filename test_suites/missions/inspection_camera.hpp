@@ -145,9 +145,10 @@ class InspectionCamera final : public Device {
 
 /// What the flight software has to know of target and images.
 inline std::string inspection_config(const InspectionCameraOptions& camera = {}) {
-  std::string text = "view_width_px = " + std::to_string(camera.lens.width_px) +
-                     "\nview_height_px = " + std::to_string(camera.lens.height_px) +
-                     "\ninertia_y = 1.4\ninertia_z = 1.7\ntumble_noise_rad2ps3 = 1e-12\nscale_error = 0.004\n";
+  std::string text =
+      "view_width_px = " + std::to_string(camera.lens.width_px) +
+      "\nview_height_px = " + std::to_string(camera.lens.height_px) +
+      "\ninertia_y = 1.4\ninertia_z = 1.7\ntumble_noise_rad2ps3 = 1e-12\nscale_error = 0.0015\n";
   for (const Vec3& p : target_corners_B()) {
     text += "keypoint = " + std::to_string(p.x) + " " + std::to_string(p.y) + " " +
             std::to_string(p.z) + "\n";

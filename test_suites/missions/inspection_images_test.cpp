@@ -109,6 +109,13 @@ void fly(RunId run, std::optional<Duration> within) {
       world.target_report.rejected, 1e-6 * double(world.heap("chaser").high_water_bytes()));
   world.record_metric("place_percent", j.place_percent);
   world.record_metric("normalised", j.normalised);
+  world.record_metric("poses", world.target_report.poses);
+  world.record_metric("images", world.camera->images());
+  world.record_metric("flips", world.target_report.flips);
+  world.record_metric("believed_flips", j.believed_flips);
+  world.record_metric("heap_bytes", double(world.heap("chaser").high_water_bytes()));
+  world.record_metric("delta_v_mps", world.delta_v_mps("chaser"));
+  world.record_metric("hours", world.hours());
   world.record_metric("attitude_median_deg", j.median_deg);
   world.record_metric("attitude_worst_deg", j.worst_deg);
   ASSERT_GT(j.beliefs, 50);
@@ -134,8 +141,15 @@ void fly(RunId run, std::optional<Duration> within) {
 // The first hours here; with WHOLE_FLIGHT=1 to 15 m and once round.
 TEST(InspectionImagesCampaign, FollowsATumblingTargetFromFrames) {
   std::optional<Duration> within;
-  if (std::getenv("WHOLE_FLIGHT") == nullptr) within = 60min;
+  if (std::getenv("WHOLE_FLIGHT") == nullptr) within = 75min;
   const Campaign campaign =
       fly_campaign(Runs{flags().runs.value_or(1)}, [within](RunId run) { fly(run, within); });
   EXPECT_EQ(campaign.passed().passed, campaign.passed().runs);
+  for (const char* name :
+       {"place_percent", "normalised", "attitude_median_deg", "attitude_worst_deg", "images",
+        "poses", "flips", "believed_flips", "heap_bytes", "delta_v_mps", "hours"}) {
+    const CampaignMetric metric = campaign.metric(name);
+    if (metric.values().empty()) continue;
+    std::printf("%s: mean %.4g, largest %.4g\n", name, metric.mean(), metric.percentile(100));
+  }
 }

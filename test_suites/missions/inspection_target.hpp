@@ -1,6 +1,7 @@
 /// The target of the near range from frames: a body of 0.6 x 0.4 x 0.3 m with two panels, a
 /// telescope's baffle on +X and a radiator on each deck. Its mesh, for the camera, and what the
-/// flight software knows of it, corners and faces, are written down apart from each other.
+/// flight software knows of it, corners and faces, are written down apart from each other: the
+/// panels are 3 mm thick in the one and plates without thickness in the other.
 #pragma once
 
 #include <orrery/models/camera/mesh.hpp>

@@ -522,13 +522,17 @@ void RpoKit::send_estimate(const RelativeOrbit& now, const Matrix6& covariance) 
       relative_state_rtn(target, state_from_osculating(osculating_from_mean(chaser)));
   const Matrix6 H = rtn_from_relative_elements(now.chief.u_rad, mean_motion_radps(now.chief.a_m));
   const Matrix6 P = H * covariance * transpose(H);
+  // A scale that images have in common does not average out. Who has the target's GNSS is rid of
+  // it.
+  const bool by_scale = navigation_.used(Source::kGnss) == 0 && navigation_.used(Source::kPose) > 0;
+  const double scale = by_scale ? configuration_.inspection.filter.scale_error : 0.0;
   RelativeOutput e;
   e.t_ns = now.t_ns;
   for (int k = 0; k < 3; ++k) {
     e.r_DC_RTN[k] = relative.r_DC_RTN[k];
     e.v_DC_RTN[k] = relative.v_DC_RTN[k];
-    e.sigma_r_m[k] = std::sqrt(P(k, k));
-    e.sigma_v_mps[k] = std::sqrt(P(k + 3, k + 3));
+    e.sigma_r_m[k] = std::hypot(std::sqrt(P(k, k)), scale * relative.r_DC_RTN[k]);
+    e.sigma_v_mps[k] = std::hypot(std::sqrt(P(k + 3, k + 3)), scale * relative.v_DC_RTN[k]);
   }
   out_.out_estimate(e);
 }
