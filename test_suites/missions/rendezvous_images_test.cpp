@@ -164,8 +164,9 @@ TEST(RendezvousImagesCampaign, FramesAndBurnsShowTheRange) {
         "outliers", "heap_bytes", "delta_v_mps", "hours"}) {
     std::printf("%s %.4g\n", name, campaign.metric(name).mean());
   }
-  EXPECT_LT(normalised, campaign.passed().runs > 4 ? 1.4 : 3.0);
-  EXPECT_GT(normalised, campaign.passed().runs > 4 ? 0.6 : 0.0);
+  // The ranges of a seed repeat each other: N seeds are 1 +- 1/sqrt(2 N), two sigma of 12 seeds.
+  EXPECT_LT(normalised, campaign.passed().runs >= 12 ? 1.4 : 3.0);
+  EXPECT_GT(normalised, campaign.passed().runs >= 12 ? 0.6 : 0.0);
 }
 
 // A mounting that is 0.4 deg off, later jumps by as much again, frames that are lost, frozen, torn
