@@ -14,6 +14,7 @@ import argparse
 import csv
 import json
 import math
+import os
 import pathlib
 import re
 import subprocess
@@ -38,13 +39,14 @@ GROWTH = "ConeProgramMemoryTest.MemoryGrowsInProportionToTheCandidates"
 
 # ---- flights
 
-def fly(program, tests, out, *flags):
+def fly(program, tests, out, *flags, **variables):
     out.mkdir(parents=True, exist_ok=True)
     command = [str(program), f"--gtest_filter={tests}", f"--orrery_out={out}", "--orrery_seed=1",
                *flags]
     print(" ".join(command), flush=True)
     with open(out / "stdout.txt", "w", encoding="utf-8") as log:
-        subprocess.run(command, stdout=log, stderr=subprocess.STDOUT, check=False)
+        subprocess.run(command, stdout=log, stderr=subprocess.STDOUT, check=False,
+                       env=dict(os.environ, **variables))
     text = output(out)
     if "[==========]" not in text or "Global test environment tear-down" not in text:
         sys.exit(f"make_page: did not end, see {out / 'stdout.txt'}")

@@ -4,8 +4,9 @@
     test_suites/missions/make_rendezvous_page.py BUILD [--flights DIR] [--redraw] [--seeds N]
         [--runs N]
 
-BUILD is a build folder with the program rendezvous_test. Flights go to DIR (BUILD/rendezvous);
---redraw takes those that are there. Equal counts give equal files. Python 3.9, standard library.
+BUILD is a build folder with the programs rendezvous_test and rendezvous_images_test. Flights go to
+DIR (BUILD/rendezvous); --redraw takes those that are there. Equal counts give equal files. Python
+3.9, standard library.
 """
 
 import argparse
@@ -19,14 +20,16 @@ from figure import BLUE, ORANGE, RED, Figure
 from make_page import PICTURES, fly, rows, seconds, start_ns
 
 FAR = "RendezvousFarRangeCampaign.DirectionsAndBurnsShowTheRange"
-NEAR = "RendezvousInspectionCampaign.FollowsATumblingTargetFromSixtyToFifteenMetres"
+NEAR = "InspectionImagesCampaign.FollowsATumblingTargetFromFrames"
 WHOLE = "RendezvousCampaign.ArrivesFromThirtyKilometresThroughOutages"
 RANGES_M = (30000, 25000, 20000, 15000, 10000, 6000, 4000, 3000, 2000)
 
 
 def fly_all(build, flights, seeds, runs):
     program = build / "test_suites/missions/rendezvous_test"
-    fly(program, f"{FAR}:{NEAR}", flights / "single", "--orrery_run=0")
+    fly(program, FAR, flights / "single", "--orrery_run=0")
+    fly(build / "test_suites/missions/rendezvous_images_test", NEAR, flights / "near",
+        "--orrery_run=0", WHOLE_FLIGHT="1")
     fly(program, FAR, flights / "far", f"--orrery_runs={seeds}", "--orrery_record=off")
     fly(program, WHOLE, flights / "whole", f"--orrery_runs={runs}", "--orrery_record=off")
 
@@ -37,8 +40,8 @@ def flown(flights, part, test):
                   key=lambda run: run["run"])
 
 
-def single(flights, test):
-    return next((flights / "single" / test).glob("seed-*"))
+def single(flights, part, test):
+    return next((flights / part / test).glob("seed-*"))
 
 
 def navigation(run):
@@ -70,7 +73,7 @@ def far_figure(flights):
                  "1 sigma of the errors" if sign > 0 else None)
         top.horizontal(3 * sign, RED, "asked: 3 %" if sign > 0 else "", anchor="start")
     top.legend(right=False, top_offset=16)
-    samples = list(navigation(single(flights, FAR)))[::6]
+    samples = list(navigation(single(flights, "single", FAR)))[::6]
     last = samples[-1][0]
     low = figure.axes(70, 340, 720, 200, x_range=(0, last), y_range=(0.1, 1e5), log_y=True,
                       x_label="time since start [h]", y_label="3D error [m]",
@@ -91,15 +94,15 @@ def channel(run, name):
 
 
 def near_figure(flights):
-    run = single(flights, NEAR)
+    run = single(flights, "near", NEAR)
     samples = list(navigation(run))[::2]
-    attitude = list(channel(run, "chaser.keypoints.attitude_error_deg"))[::3]
-    sigma = list(channel(run, "chaser.keypoints.attitude_sigma_deg"))[::3]
+    attitude = list(channel(run, "chaser.view.attitude_error_deg"))[::3]
+    sigma = list(channel(run, "chaser.view.attitude_sigma_deg"))[::3]
     span = (0, samples[-1][0])
     figure = Figure(820, 460)
     top = figure.axes(70, 36, 720, 150, x_range=span, y_range=(1e-3, 10), log_y=True,
                       y_label="3D error [m]", x_numbers=False,
-                      title="60 m to 15 m from a target that tumbles, seed 1")
+                      title="60 m to 15 m from a target that tumbles, from frames, seed 1")
     top.line([(t, math.hypot(*s)) for t, _, s in samples], ORANGE, 1.2, "1 sigma, 3D")
     top.line([(t, math.hypot(*e)) for t, e, _ in samples], BLUE, 1.0, "error, 3D")
     top.legend()
@@ -109,7 +112,7 @@ def near_figure(flights):
     low.dots(sigma, ORANGE, 1.0, 0.5, "1 sigma")
     low.horizontal(2, RED, "asked of the median: 2 deg")
     low.legend()
-    figure.text(790, 454, "gaps: the target in the Earth's shadow", size=10, anchor="end")
+    figure.text(790, 454, "gaps: the target in the Earth's shadow, or near the Sun", size=10, anchor="end")
     figure.write(PICTURES / "rendezvous_near.svg")
 
 
