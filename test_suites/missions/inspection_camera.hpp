@@ -36,39 +36,23 @@ struct InspectionCameraOptions {
 };
 
 /// Device "view". The target as the mesh that it is, lit by Sun and Earth, before what of the Earth
-/// is behind it. It holds the target's attitude: that of the world points to the zenith.
-/// Shut while the target is in the Earth's shadow, or within 30 deg of the Sun.
-class InspectionCamera final : public Device {
+/// is behind it. Shut while the target is in the Earth's shadow, or within 30 deg of the Sun.
+class InspectionCamera final : public TumblingTargetSensor {
  public:
   InspectionCamera(TruthOf target, const InspectionCameraOptions& options)
-      : target_(std::move(target)),
+      : TumblingTargetSensor(std::move(target)),
         options_(options),
         camera_(options.lens),
         scene_(camera_, options.optics, {.targets = {inspection_mesh()}}) {}
   std::string_view name() const override { return "view"; }
   void start(DeviceContext& io) override {
-    io_ = &io;
+    tumble(io, options_.rate_radps);
     if (!detector_) {
-      body_ = tumbling_body(io.random("tumbling"), options_.rate_radps);
-      body_t_ = io.now();
       detector_.emplace(options_.detector, camera_.width_px(), camera_.height_px(),
                         io.random("fixed_pattern"));
     }
     io.every(options_.period, [this, &io] { expose(io); });
   }
-  /// True attitude and rate, at `t`, not before the last exposure or question.
-  const TumblingBody& body(SimTime t) {
-    body_.advance(std::chrono::duration<double>(t - body_t_).count());
-    body_t_ = t;
-    return body_;
-  }
-  /// Channels "attitude_error_deg" and "attitude_sigma_deg": what flight software made of them.
-  void note_attitude(double error_rad, double sigma_rad) {
-    if (io_ == nullptr) return;
-    io_->record("attitude_error_deg", error_rad / kDegree_rad);
-    io_->record("attitude_sigma_deg", sigma_rad / kDegree_rad);
-  }
-  int images() const { return images_; }
 
  private:
   void expose(DeviceContext& io) {
@@ -132,15 +116,11 @@ class InspectionCamera final : public Device {
                    to_png(image, options_.detector.bits));
   }
 
-  TruthOf target_;
   InspectionCameraOptions options_;
   PinholeCamera camera_;
   Scene scene_;
   std::optional<Detector> detector_;
-  TumblingBody body_;
-  SimTime body_t_{}, next_record_{};
-  DeviceContext* io_ = nullptr;
-  int images_ = 0;
+  SimTime next_record_{};
 };
 
 /// What the flight software has to know of target and images.

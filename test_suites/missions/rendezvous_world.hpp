@@ -196,35 +196,55 @@ struct KeypointOptions {
   double rate_radps = 1 * kDegree_rad;              // of the tumbling
 };
 
-/// Device "keypoints": corners of the tumbling target that are turned to the chaser, and the
-/// panels', in pixels of a camera that is held on the target. Fault "blinded": no image.
-class KeypointSensor final : public Device {
+/// A sensor of the target's attitude, which tumbles in the sensor alone: that of the world points
+/// to the zenith.
+class TumblingTargetSensor : public Device {
  public:
-  KeypointSensor(TruthOf target, const KeypointOptions& options)
-      : target_(std::move(target)), options_(options) {}
-  std::string_view name() const override { return "keypoints"; }
-  void start(DeviceContext& io) override {
-    io_ = &io;
-    if (!tumbling_) {
-      body_ = tumbling_body(io.random("tumbling"), options_.rate_radps);
-      body_t_ = io.now();
-      tumbling_ = true;
-    }
-    io.every(options_.period, [this, &io] { expose(io); });
-  }
   /// True attitude and rate, at `t`, not before the last exposure or question.
   const TumblingBody& body(SimTime t) {
     body_.advance(std::chrono::duration<double>(t - body_t_).count());
     body_t_ = t;
     return body_;
   }
-  /// Channels "attitude_error_deg" and "attitude_sigma_deg": what flight software made of them.
+  /// Channels "attitude_error_deg" and "attitude_sigma_deg": what flight software made of it.
   void note_attitude(double error_rad, double sigma_rad) {
     if (io_ == nullptr) return;
     io_->record("attitude_error_deg", error_rad / kDegree_rad);
     io_->record("attitude_sigma_deg", sigma_rad / kDegree_rad);
   }
   int images() const { return images_; }
+
+ protected:
+  explicit TumblingTargetSensor(TruthOf target) : target_(std::move(target)) {}
+  /// In start(); what tumbles goes on through a power cycle.
+  void tumble(DeviceContext& io, double rate_radps) {
+    if (io_ == nullptr) {
+      body_ = tumbling_body(io.random("tumbling"), rate_radps);
+      body_t_ = io.now();
+    }
+    io_ = &io;
+  }
+
+  TruthOf target_;
+  int images_ = 0;
+
+ private:
+  TumblingBody body_;
+  SimTime body_t_;
+  DeviceContext* io_ = nullptr;
+};
+
+/// Device "keypoints": corners of the tumbling target that are turned to the chaser, and the
+/// panels', in pixels of a camera that is held on the target. Fault "blinded": no image.
+class KeypointSensor final : public TumblingTargetSensor {
+ public:
+  KeypointSensor(TruthOf target, const KeypointOptions& options)
+      : TumblingTargetSensor(std::move(target)), options_(options) {}
+  std::string_view name() const override { return "keypoints"; }
+  void start(DeviceContext& io) override {
+    tumble(io, options_.rate_radps);
+    io.every(options_.period, [this, &io] { expose(io); });
+  }
   int flipped() const { return flipped_; }
 
  private:
@@ -278,13 +298,8 @@ class KeypointSensor final : public Device {
     });
   }
 
-  TruthOf target_;
   KeypointOptions options_;
-  TumblingBody body_;
-  SimTime body_t_;
-  DeviceContext* io_ = nullptr;
-  bool tumbling_ = false;
-  int images_ = 0, flipped_ = 0;
+  int flipped_ = 0;
 };
 
 /// What the flight software has to know of target and camera.
