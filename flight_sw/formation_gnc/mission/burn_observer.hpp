@@ -4,8 +4,8 @@
 /// Method      What is found rests on the prediction too; what measurements alone say of the burn
 /// is
 ///             further off by before / (before - after), the variances of the velocity, and as
-///             uncertain as their information makes it. One burn at a time; others in between are
-///             in the prediction or not looked at.
+///             uncertain as their information makes it. One burn at a time: the thruster's are
+///             further apart.
 /// Frames      Burns and velocities in ECI, nozzles in body axes; SI.
 #pragma once
 

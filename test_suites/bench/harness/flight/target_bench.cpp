@@ -79,6 +79,12 @@ void BM_Target_ProcessOfThisProcessor(benchmark::State& state) {
 }
 BENCHMARK(BM_Target_ProcessOfThisProcessor)->ArgName("one_core")->Arg(0)->Arg(1)->UseRealTime();
 
+// The same without the memory beside the pipes, which the target then does not know of.
+void BM_Target_ByPipes(benchmark::State& state) {
+  run(state, "exec:env -u ORRERY_MAILBOX " TARGET_PROGRAM " " SUBJECT_LIBRARY);
+}
+BENCHMARK(BM_Target_ByPipes)->ArgName("one_core")->Arg(0)->Arg(1)->UseRealTime();
+
 void BM_Target_EmulatedArm(benchmark::State& state) {
   if (std::system("command -v qemu-arm > /dev/null") != 0) {
     state.SkipWithError("qemu-arm is not installed");
